@@ -18,7 +18,7 @@ namespace {
 
 bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
 
-/// For reading. Throws bagError where that cannot be.
+/// Opens a bag for reading. Throws bagError if that fails.
 void openBag(const std::string& path, rosbag::Bag* bag) {
   namespace fs = std::filesystem;
   if (!fs::exists(path))
@@ -45,17 +45,18 @@ std::runtime_error bagError(const std::string& bag, const std::string& what) {
 }
 
 std::runtime_error bagError(const std::string& bag, const std::exception& thrown) {
-  // rosbag and the reader of messages throw these. Their texts name neither the file nor the reason.
-  const bool is_of_bytes = dynamic_cast<const ros::Exception*>(&thrown) != nullptr;
-  return bagError(bag,
-                  is_of_bytes ? std::string("perhaps it is damaged (") + thrown.what() + ")" : thrown.what());
+  // rosbag and the reader of messages throw ros::Exception, whose text names neither the file nor the reason.
+  const bool is_from_rosbag = dynamic_cast<const ros::Exception*>(&thrown) != nullptr;
+  return bagError(
+      bag, is_from_rosbag ? std::string("perhaps it is damaged (") + thrown.what() + ")" : thrown.what());
 }
 
 void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write) {
   std::unique_ptr<rosbag::Bag> bag;
   const auto discard = [&] {
     if (!bag) return;
-    // Its destructor would write again, and end the program if that fails. So it lives on.
+    // The bag is leaked on purpose: its destructor would write again, and a failure there would end the
+    // program.
     static auto* const discarded = new std::vector<rosbag::Bag*>();
     discarded->push_back(bag.release());
     std::error_code ignored;

@@ -25,8 +25,8 @@ std::runtime_error bagError(const std::string& bag, const std::string& what);
 /// the bag may be damaged.
 std::runtime_error bagError(const std::string& bag, const std::exception& thrown);
 
-/// Makes a bag, which `write` fills. If that fails, there is no file, and what it throws names the bag if the
-/// bag is to blame.
+/// Creates a bag and calls `write` to fill it. If that fails, removes the file. Throws std::runtime_error
+/// that names the bag if rosbag failed; all other exceptions pass.
 void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write);
 
 /// Bags that are played as one, in the order of their record times.
@@ -40,7 +40,7 @@ class Bags {
   /// Adds what `query` finds to the view.
   void addTo(rosbag::View* view, const std::function<bool(const rosbag::ConnectionInfo*)>& query,
              const ros::Time& begin = ros::TIME_MIN, const ros::Time& end = ros::TIME_MAX) const;
-  /// A topic with two types gets "A and B", so that no reader takes it.
+  /// Returns the type of each topic. A topic with two types gets "A and B", which no reader accepts.
   std::map<std::string, std::string> typesByTopic() const;
   /// The record times of the first and the last message. Throws bagError if there is none.
   std::pair<ros::Time, ros::Time> span() const;
@@ -52,11 +52,11 @@ class Bags {
 
 /// "/imu (sensor_msgs/Imu), ..."
 std::string topicsText(const std::map<std::string, std::string>& types);
-/// Throws bagError that names all which are missing or of another type.
+/// Throws bagError that names all wanted topics that are missing or have another type.
 void checkTopics(const std::string& bag, const std::map<std::string, std::string>& types,
                  const std::vector<InputTopic>& wanted);
 
-/// Begin and end of what is played, by the keys bag_start and bag_duration.
+/// Returns begin and end of the part to play, as bag_start and bag_duration set it.
 std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config);
 
 /// Poses of a topic of geometry_msgs/PoseStamped, in the order of their stamps. Throws

@@ -22,7 +22,7 @@ std::string firstFrame(const Bags& bags, const std::string& topic) {
   return view.begin() == view.end() ? "" : read<Message>(*view.begin())->header.frame_id;
 }
 
-/// T_IR by radar; what is missing goes into `missing`.
+/// Returns T_IR by radar. If a transform is missing, `missing` says which.
 std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Config>& radars,
                                const std::string& imu_frame, const std::vector<std::string>& cloud_frames,
                                std::string* missing) {
@@ -57,13 +57,14 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
   for (Config& radar : radars) {
     const bool wants = radar.extrinsics_source == ExtrinsicsSource::kTf;
     is_wanted = is_wanted || wants;
-    radar.publish_radar_tf = false;  // nobody publishes here
+    radar.publish_radar_tf = false;  // the bag runner publishes no tf
     cloud_frames.push_back(
         wants ? cloudFrame(radar, firstFrame<sensor_msgs::PointCloud2>(bags, radar.radar_topic)) : "");
   }
   if (!is_wanted) return config;
   const std::string imu_frame = imuFrame(config, firstFrame<sensor_msgs::Imu>(bags, config.imu_topic));
-  // A mounting does not move, wherever it is published: the first transform of each frame holds for good.
+  // A mounting does not move, even if it is published on /tf: the first transform of each frame holds for
+  // good.
   tf2::BufferCore tf;
   std::string missing;
   std::vector<Extrinsics> T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);

@@ -36,7 +36,7 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
       publishers_[topic].add(instance.getCallerId(), message->header.frame_id);
       addCloud(*message, record, k);
     }
-    // One line may trigger several radars.
+    // One trigger line may serve several radars.
     if (topic == radars_[k].trigger_topic) addTrigger(*read<std_msgs::Header>(instance), record, k);
   }
   for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.take(), k);
@@ -59,7 +59,7 @@ void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {
 }
 
 RunSummary BagPlayer::summary(const RunLog& log) const {
-  // None while the odometry waits to start again. The run then still began from something.
+  // The odometry has no start while it waits to start again. Then the first start counts.
   const std::optional<RadarInertialOdometry::Start> newest = odometry_.start();
   RunSummary summary(evidence_.evidence(odometry_, newest ? newest : start_));
   summary.initialized = start_ || odometry_.initialized();

@@ -23,19 +23,19 @@
 
 namespace rio_t {
 
-/// Feeds the estimator message by message.
+/// Feeds the messages of a bag to the estimator, one by one.
 class BagPlayer {
  public:
-  /// `config` and `log` must outlive the player. `recorder`: keeps the run for a batch; may be null.
+  /// `config` and `log` must outlive the player. `recorder` keeps the run for a batch; it may be null.
   BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder);
 
   void play(const rosbag::MessageInstance& instance);
-  /// At the end of the bag.
+  /// Call it at the end of the bag.
   void finish();
 
   /// Returns counts of messages and scans, the measured noise, the diagnosis, and the estimates of `log`.
   RunSummary summary(const RunLog& log) const;
-  /// The first initialisation; none before it.
+  /// The first initialisation; empty before it.
   const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
 
  private:
@@ -54,7 +54,7 @@ class BagPlayer {
   void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
-  /// One bad message among good ones is counted; `why` is reported at the end, the first one of each kind.
+  /// Counts a message that cannot be used. The summary reports the first `why` of each kind and topic.
   NotUsable& notUsable(const std::string& kind, const std::string& topic, const std::string& why);
   /// The same for a scan, which then counts as rejected.
   void dropScan(const std::string& kind, const std::string& why, std::size_t radar);
@@ -69,7 +69,7 @@ class BagPlayer {
   EvidenceCollector evidence_;
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0;
-  std::optional<BarometerCounts> barometer_;  // if there is one
+  std::optional<BarometerCounts> barometer_;  // empty without one
   std::vector<NotUsable> not_usable_;
   std::map<std::string, Publishers> publishers_;  // by topic
 };

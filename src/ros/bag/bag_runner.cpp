@@ -35,7 +35,6 @@ std::string allRejected(const RadarSummary& radar) {
          (radar.name.empty() ? "" : "of radar " + radar.name + " ") + "was rejected: " + reasons;
 }
 
-/// The warnings that concern the aids.
 void warnOfAids(const Config& config, RunSummary* summary) {
   if (summary->barometer && summary->barometer->used == 0)
     summary->warnings.push_back("no pressure of topic " + config.barometer_topic +
@@ -52,7 +51,7 @@ void warnOfAids(const Config& config, RunSummary* summary) {
                                 kGroundVehicleContradicted);
 }
 
-/// A radar among several that gave nothing: the others carry the run, but it must be said.
+/// Warns about each of several radars of which no scan was used, since the others carry the run.
 void warnOfSilentRadars(const Config& config, RunSummary* summary) {
   if (summary->radars.size() < 2) return;
   for (std::size_t k = 0; k < summary->radars.size(); ++k) {
@@ -70,7 +69,7 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
     for (const Config& radar : configsOfRadars(config)) appendItem(&topics, noMessages(radar), "; ");
     throw bagError(bag, topics);
   }
-  // If most messages of a topic cannot be used, that is the cause, not what became of the rest.
+  // If most messages of a topic cannot be used, the error says that, and not what became of the rest.
   std::string unusable_scans;
   std::uint64_t unusable = 0;
   for (const NotUsable& each : summary.not_usable) {
@@ -95,8 +94,8 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
   throw failed(reasons);
 }
 
-/// Takes the offsets [s], by radar, off the stamps, so that those that are left start at zero.
-void takeOff(const std::vector<double>& offsets, Config* config) {
+/// Subtracts the offsets [s], by radar, from the stamps. The estimate of what remains starts at zero.
+void subtractFromStamps(const std::vector<double>& offsets, Config* config) {
   const auto of = [](double offset, Config* radar) {
     radar->radar_stamp_shift -= offset;
     radar->odometry.radar.time_offset_initial = 0.0;
@@ -119,13 +118,13 @@ TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
   return errors;
 }
 
-/// The bags with their configuration: what all modes share, and the modes.
+/// Runs the bags in the mode of the configuration.
 class BagJob {
  public:
   /// Opens and checks the bags, and makes the output folder.
   explicit BagJob(const BagRun& run) : run_(run), files_(runFiles(run.config)), bags_(run.bags) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    // The check again: with the names that the bag has, two radars may have one topic.
+    // This checks again, since two radars may have one topic once the topics are resolved.
     run_.config = withParameters(
         withTopics(run.config, [&](const std::string& /*key*/,
                                    const std::string& topic) { return topicOfBag(topic, types); }),
@@ -155,12 +154,12 @@ class BagJob {
 
  private:
   RunSummary online() {
-    RunLog log(run_.config, output_.get(), nothingTakenOff(), hasTruth());
+    RunLog log(run_.config, output_.get(), zeroOffsets(), hasTruth());
     BagPlayer player(run_.config, &log, nullptr);
     return finish(play(player, run_.config, log, 0.0, 1.0), log, output_.get());
   }
 
-  /// Replaces what the online run estimated by what the batch did. The counts are those of the online run,
+  /// Replaces the estimates of the online run by those of the batch. The counts stay those of the online run,
   /// which chose the terms.
   static void addAids(const BatchSolution& solution, RunSummary* summary) {
     if (summary->ground_vehicle && solution.T_IV) {
@@ -179,15 +178,15 @@ class BagJob {
     batch_options.max_iterations = run_.config.batch_max_iterations;
     BatchOdometry recorder(options, batch_options);
     const std::unique_ptr<RunOutput> online_output = openOutput("/online");
-    RunLog online_log(run_.config, online_output.get(), nothingTakenOff(), hasTruth());
+    RunLog online_log(run_.config, online_output.get(), zeroOffsets(), hasTruth());
     BagPlayer player(run_.config, &online_log, &recorder);
     finish(play(player, run_.config, online_log, 0.0, 0.9), online_log, online_output.get());
 
     const BatchResult result = recorder.solve(*player.start());
-    RunLog log(run_.config, output_.get(), nothingTakenOff(), hasTruth());
+    RunLog log(run_.config, output_.get(), zeroOffsets(), hasTruth());
     for (const NavigationState& state : result.trajectory) log.addState(state);
     for (ScanResult scan : result.scans) log.addResult(scan);
-    RunSummary summary = player.summary(log);  // what the batch does not change, and its estimates
+    RunSummary summary = player.summary(log);  // counts of the online run, estimates of the batch
     summary.mode = "batch";
     summary.batch =
         BatchSummary{result.solution.iterations, result.solution.placements, result.solution.converged()};
@@ -197,25 +196,25 @@ class BagJob {
     return finish(std::move(summary), log, output_.get());
   }
 
-  /// The offset found is taken off the stamps. The rest is estimated from zero, with the sigma of the first
-  /// pass: the data are the same in each pass, and a sigma from the pass before would count them twice.
+  /// Each pass subtracts the offset found so far from the stamps and estimates what remains, from zero and
+  /// with the sigma of the first pass. A sigma from the pass before would count the same data twice.
   RunSummary refine() {
     const int passes = run_.config.refine_passes;
-    std::vector<double> taken_off = nothingTakenOff();  // [s] by radar
-    std::vector<std::vector<double>> offsets(taken_off.size());
+    std::vector<double> subtracted = zeroOffsets();  // [s] by radar
+    std::vector<std::vector<double>> offsets(subtracted.size());
     for (int pass = 1;; ++pass) {
       Config config = run_.config;
-      if (pass > 1) takeOff(taken_off, &config);
+      if (pass > 1) subtractFromStamps(subtracted, &config);
       const bool last = pass == passes;
       const std::unique_ptr<RunOutput> earlier = last ? nullptr : openOutput("/pass_" + std::to_string(pass));
       RunOutput* output = last ? output_.get() : earlier.get();
-      RunLog log(config, output, taken_off, hasTruth());
+      RunLog log(config, output, subtracted, hasTruth());
       BagPlayer player(config, &log, nullptr);
       RunSummary summary =
           play(player, config, log, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
-      for (std::size_t k = 0; k < taken_off.size(); ++k) {
+      for (std::size_t k = 0; k < subtracted.size(); ++k) {
         RadarSummary& radar = summary.radars[k];
-        offsets[k].push_back(taken_off[k] = radar.final_offset_s);
+        offsets[k].push_back(subtracted[k] = radar.final_offset_s);
         if (last) radar.pass_offsets_s = offsets[k];
       }
       if (last) summary.mode = "refine";
@@ -237,9 +236,9 @@ class BagJob {
   }
 
   bool hasTruth() const { return truth_in_bag_ || !run_.config.ground_truth.empty(); }
-  std::vector<double> nothingTakenOff() const { return std::vector<double>(files_.radars.size(), 0.0); }
+  std::vector<double> zeroOffsets() const { return std::vector<double>(files_.radars.size(), 0.0); }
 
-  /// The whole bag; progress goes from `from` to `to`.
+  /// Plays the whole bag. The progress goes from `from` to `to`.
   RunSummary play(BagPlayer& player, const Config& config, const RunLog& log, double from, double to) {
     const double length = (end_ - begin_).toSec();
     try {
@@ -263,10 +262,10 @@ class BagJob {
     return summary;
   }
 
-  /// Adds speed and errors, and saves.
+  /// Completes the summary with speed and errors, and saves it.
   RunSummary finish(RunSummary summary, RunLog& log, RunOutput* output) {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
-    // Keys and files of the only radar carry no name. The diagnosis does: it names sections.
+    // The keys and files of a single radar carry no name. Its diagnosis does, since it names the section.
     if (summary.radars.size() == 1) summary.radars.front().name.clear();
     warnOfSilentRadars(run_.config, &summary);
     warnOfAids(run_.config, &summary);
@@ -291,15 +290,16 @@ class BagJob {
     return summary;
   }
 
-  BagRun run_;  // with the names that the bag resolves
+  BagRun run_;  // with topics and extrinsics resolved by the bag
   const RunFiles files_;
   const Bags bags_;
   std::vector<std::string> topics_;
   ros::Time begin_, end_;
   bool truth_in_bag_ = false;
   Trajectory truth_;
-  std::optional<std::runtime_error> truth_error_;  // why it does not judge what was last finished
-  std::unique_ptr<RunOutput> output_;              // null: no files
+  std::optional<std::runtime_error>
+      truth_error_;                    // why the last finished run has no errors against the truth
+  std::unique_ptr<RunOutput> output_;  // null: no files
   std::chrono::steady_clock::time_point started_;
 };
 

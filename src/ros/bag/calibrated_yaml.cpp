@@ -16,7 +16,7 @@ ProposedKeys keysOf(const ParameterEntries& entries) {
   return keys;
 }
 
-/// As configured to the last digit, else without digits that say nothing.
+/// Keeps a configured value to the last digit, and rounds any other.
 double written(double value, double configured, double per) {
   return value == configured ? configured : rounded(value, per);
 }
@@ -28,7 +28,7 @@ ParameterValue writtenList(Eigen::VectorXd values, const Eigen::VectorXd& config
 
 /// The keys of a radar that are calibrated.
 ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& configured, bool pose) {
-  constexpr double kMicro = 1e6, kNano = 1e9;  // in one
+  constexpr double kMicro = 1e6, kNano = 1e9;  // steps per unit that rounded() keeps
   const CalibrationPrior& prior = configured.odometry.radar;
   const bool offset_found =
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
@@ -40,7 +40,8 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& c
              "The next run goes on with the estimate from here.");
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), prior.T_IR.q_IR.coeffs(), kNano));
-  // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
+  // The next run starts from this sigma. It is at least the smallest step that the step detector finds, since
+  // the offset of the next run may differ by that.
   const double least = configured.odometry.offset_step_detector.min_change;
   const OffsetEstimate offset =
       offset_found
@@ -68,12 +69,13 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
   return commented(text, "");
 }
 
-/// How the next run goes on from a mounting that is known to `turn_sigma` [rad].
+/// Returns the keys for the next run, which goes on with the estimate. The mounting is known to `turn_sigma`
+/// [rad].
 std::string estimateNext(double turn_sigma, bool pose) {
   ProposedKeys keys;
   keys.set("estimate_extrinsics", pose ? "pose" : "rotation",
-           "The bags show the mounting to the sigmas below. The next run starts from the largest of a turn, "
-           "and goes on with the estimate: an error of the mounting is then in its sigmas.");
+           "The next run starts from the largest rotation sigma below, and goes on with the estimate. So its "
+           "sigmas cover the error that the mounting still has.");
   keys.set("extrinsics_rotation_sigma", ParameterValue{std::max(rounded(turn_sigma, 1e6), 1e-6)});
   return toYaml(keys, "");
 }
@@ -86,8 +88,8 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
   Config any;
   SortedEntries sorted = sortedEntries(given, parametersOf(any));
   ProposedKeys top_level = keysOf(sorted.top_level);
-  // The mounting found is written as a quaternion of RIO's axes. Configured in another way, it would count
-  // twice.
+  // The found mounting is written as a quaternion in RIO's axes. The other keys for the mounting go, since it
+  // would count twice.
   for (const char* key :
        {"estimate_extrinsics", "extrinsics_rotation_sigma", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
     top_level.remove(key);

@@ -16,7 +16,7 @@ namespace {
 Config batchConfig(const Config& config) {
   Config batch = config;
   batch.mode = RunMode::kBatch;
-  // `none` is the default and means pose here, with a lever arm or without, and on any platform.
+  // Here none, the default, means pose, with or without a lever arm and on any platform.
   if (config.estimate_extrinsics != EstimateExtrinsics::kNone) return batch;
   const auto estimate = [&](SmootherOptions& smoother) {
     smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
@@ -27,7 +27,7 @@ Config batchConfig(const Config& config) {
   return batch;
 }
 
-/// A folder for each bag, named after it: FOLDER/run, FOLDER/run_2.
+/// Names a folder after each bag: FOLDER/run, FOLDER/run_2.
 std::vector<std::string> foldersOf(const CalibrationRun& run) {
   std::vector<std::string> folders;
   std::set<std::string> taken;

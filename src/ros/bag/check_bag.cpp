@@ -15,8 +15,8 @@
 namespace rio_t {
 namespace {
 
-/// The IMU that can be used, with the most samples; if none can be used, one that says why. There is at least
-/// one. The report names the others.
+/// Chooses the usable IMU with the most samples. If none is usable, the one with the most samples says why.
+/// The report names the others. There is at least one IMU.
 ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
   std::vector<ImuInspection> imus;
   for (const ImuTopic& topic : recording.imus) imus.push_back(inspectImuTopic(topic));
@@ -52,7 +52,7 @@ bool hasCloud(const Recording& recording, const std::string& topic) {
                      [&](const CloudTopic& cloud) { return cloud.topic == topic; });
 }
 
-/// Says that the bag has no clouds on these topics; empty: on any topic.
+/// Says that the bag has no clouds on these topics. An empty list means any topic.
 void missRadar(const std::vector<std::string>& topics, const Recording& recording, BagCheck* check) {
   std::string wanted;
   for (const std::string& topic : topics) wanted += topic + " ";
@@ -65,7 +65,7 @@ void missRadar(const std::vector<std::string>& topics, const Recording& recordin
           : "Record the radar, too: a point cloud with positions and Doppler.");
 }
 
-/// Two topics of one radar, one filtered: the other has more points.
+/// A driver may publish one radar on two topics, one of them filtered. Keeps the topic with more points.
 void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recording, BagCheck* check) {
   const auto stampsOf = [&](const std::string& topic) {
     std::set<std::int64_t> stamps;
@@ -102,8 +102,9 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
   }
 }
 
-/// The odometry runs well with a negated accelerometer, too: its track is a mirror image.
-void doubtMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) {
+/// Marks a good trial run as odd if the axes are mirrored. With a negated accelerometer the odometry runs
+/// well, too, but its track is a mirror image.
+void markMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) {
   const bool is_mirrored = std::any_of(radars.begin(), radars.end(),
                                        [](const RadarInspection& each) { return each.search.mirrored; });
   if (!is_mirrored) return;
@@ -114,7 +115,8 @@ void doubtMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) 
   }
 }
 
-/// Before all else: with two nodes on one topic, all that follows misleads. Returns whether there are any.
+/// Names the topics with several publishers. They mislead all other checks, so this comes first. Returns
+/// whether there are any.
 bool nameSeveralPublishers(const Recording& recording, BagCheck* check) {
   const auto name = [check](const std::string& subject, const auto& topic) {
     const std::string several = topic.publishers.describeSeveral(topic.topic);
@@ -170,7 +172,7 @@ void checkRecording(const Recording& recording, const CheckRequest& request, Bag
     }
     return;
   }
-  // A cloud of another sensor beside a radar that works is no reason to stop.
+  // A radar works, so a cloud of another sensor is no reason to stop.
   for (Finding& finding : check->findings) {
     if (finding.level == FindingLevel::kMissing) finding.level = FindingLevel::kOdd;
   }
@@ -183,7 +185,7 @@ void checkRecording(const Recording& recording, const CheckRequest& request, Bag
   const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
     chooseByTrial(recording, header(recording), config, check);
-    doubtMirrored(radars, check);
+    markMirrored(radars, check);
   } else {
     check->yaml = toYaml(config, header(recording));
     readBack(check->yaml);

@@ -33,8 +33,8 @@ void drawRig(const std::string& yaml, const std::string& png) {
     throw std::runtime_error("--rig " + png + ": draw_rig.py failed");
 }
 
-/// For a shell.
-std::string word(const std::string& path) {
+/// Quotes a path for a shell if it needs quotes.
+std::string quoted(const std::string& path) {
   const std::string special = " \t'\"\\$`~*?[](){}<>|&;#!";
   return path.find_first_of(special) == std::string::npos
              ? path
@@ -88,8 +88,9 @@ int runCheck(const CheckRequest& request, std::ostream& out) {
     const std::string kept = writeFile(request.out, best->yaml);
     out << "Written to " << request.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
         << ". Next: rosrun rio_t rio_t_bag";
-    for (const std::string& bag : best->bags) out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
-    out << " --config " << word(request.out) << " --output-dir results\n";
+    for (const std::string& bag : best->bags)
+      out << " --bag " << (request.bags_go_away ? "BAG" : quoted(bag));
+    out << " --config " << quoted(request.out) << " --output-dir results\n";
   }
   if (!request.rig.empty()) {
     const TemporaryFolder folder;

@@ -10,12 +10,12 @@
 
 namespace rio_t {
 
-/// The configuration for an IMU and radars as they were found. It keeps what the user has `configured`.
+/// Proposes a configuration from what was found. It keeps what the user has `configured`.
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
                               const ParameterEntries& configured);
 
-/// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or
-/// that of one of its radars alone. `header`: lines for the beginning of the file.
+/// Runs the odometry on the bag. `check` gets the configuration with which it runs best: `config`, or that of
+/// one of its radars alone. `header`: lines for the beginning of the file.
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
                    BagCheck* check);
 

@@ -30,7 +30,7 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
       });
       if (!shared && !word.empty()) appendItem(&name, word, "_");
     }
-    // A name that YAML takes for a number or a truth value is none.
+    // YAML must read the name as text, not as a number or a truth value.
     const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0 &&
                          std::holds_alternative<std::string>(parsePlainScalar(name).data);
     const bool taken = std::find(names.begin(), names.end(), name) != names.end() ||
@@ -46,7 +46,7 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
   return names;
 }
 
-/// The keys of clouds are in `radars` already: with them the clouds were read.
+/// Adds what the user has configured. The keys that say how to read a cloud are there already.
 void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   Config any;
   const ParameterList list = parametersOf(any);
@@ -65,8 +65,8 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   }
 }
 
-/// The keys of a radar. A lever arm that the user gives replaces that of the bag. The latter is too coarse
-/// for a run that would hold it: such a run gets none, and so estimates it.
+/// Returns the keys of a radar. A lever arm of the user replaces that of the bag. A run that holds the
+/// mounting gets none, and therefore estimates it: that of the bag is too coarse to be held.
 ProposedKeys keysOf(const RadarInspection& radar, const ParameterEntries& configured) {
   ProposedKeys keys = radar.keys;
   const bool holds = isConfigured("estimate_extrinsics", configured) &&

@@ -15,7 +15,7 @@ struct Trial {
 
   /// Neither copies nor scans before the start count.
   double shareUsed() const {
-    // A copy has the stamp of the other, or another arrival, or no trigger of its own.
+    // By the source of the stamps, a copy is rejected for one of these reasons.
     std::uint64_t rejected = 0;
     for (const char* reason : {"duplicate_stamp", "scan_repeated", "trigger_missing"})
       rejected += countOf(summary.scansRejected(), reason);
@@ -74,7 +74,7 @@ std::string verdictText(const Diagnosis& diagnosis) {
   if (diagnosis.causes.empty()) return text;
   const Cause& cause = diagnosis.causes.front();
   text += ": " + cause.text;
-  // check_bag runs already.
+  // The user runs check_bag just now.
   return cause.remedy_is_check_bag ? text : text + " " + cause.remedy;
 }
 
@@ -110,7 +110,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
                    BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
-  std::string note;  // on the best one
+  std::string note;  // about `best`
   const auto attempt = [&](const ProposedConfig& proposed, const std::string& its_note) {
     const std::string yaml = toYaml(proposed, header);
     const Trial trial = tryOut(recording, yaml, duration);
@@ -120,7 +120,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     note = its_note;
   };
   attempt(config, "");
-  // One radar alone may do.
+  // One radar alone may run better.
   for (const auto& [name, keys] : config.radars) {
     if (best.good()) break;
     ProposedConfig alone{config.top_level, {}};

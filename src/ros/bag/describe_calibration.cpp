@@ -13,7 +13,7 @@ namespace {
 struct AxisText {
   const char* name;
   const char* unit;
-  double per;  ///< so many units in one of AxisCalibration
+  double per;  ///< units of the table in one unit of AxisCalibration
   int decimals;
 };
 /// By CalibrationAxis.
@@ -45,15 +45,15 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   return row + "\n";
 }
 
-/// What a reader must not overlook.
+/// Returns what a reader must not overlook.
 std::string remarks(const CalibratedRadar& radar) {
   std::string text;
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis) {
     constexpr double kFar = 3.0;
     const double far = radar.calibration.axes[axis].farFromConfigured();
     if (far < kFar) continue;
-    text += std::string("  The ") + kAxes[axis].name + " is " + fixedText(far, 1) +
-            " sigma away from it, by the given sigma: are topic, axes, signs and units right?\n";
+    text += std::string("  The ") + kAxes[axis].name + " differs from the given value by " +
+            fixedText(far, 1) + " times its given sigma: are topic, axes, signs and units right?\n";
   }
   if (!radar.calibration.offset_agreement.agree()) {
     std::string offsets;
@@ -61,19 +61,19 @@ std::string remarks(const CalibratedRadar& radar) {
       appendItem(&offsets, fixedText(1e3 * offset.t_O, 2) + " ms");
     text += "  The offset differs between the bags: " + offsets +
             "; a driver's restart may change it.\n"
-            "  Found is their mean, and its sigma covers the differences.\n";
+            "  The value found is their mean, and its sigma covers the differences.\n";
   }
   const Agreement& extrinsics = radar.calibration.extrinsics_agreement;
   if (!extrinsics.agree()) {
     text += "  The mounting differs between the bags by more than the sigmas say: chi-squared " +
             fixedText(extrinsics.chi_squared, 1) + " with " + std::to_string(extrinsics.degrees_of_freedom) +
             " degrees of freedom.\n  The sigmas are " + fixedText(extrinsics.widening(), 1) +
-            " times as wide for that.\n";
+            " times wider for that reason.\n";
   }
   return text;
 }
 
-/// The mounting found, as mounting_yaw_pitch_roll_deg has it.
+/// Returns the mounting found, as mounting_yaw_pitch_roll_deg has it.
 std::string mountingWords(const CalibratedRadar& radar) {
   const MountingAngles found = mountingOf(radar.calibration.T_IR.q_IR);
   const auto degrees = [](double angle) { return fixedText(1.0 / kDegree * angle, 1); };

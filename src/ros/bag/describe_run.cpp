@@ -25,7 +25,8 @@ std::string describeStep(const KnownDoppler& step) {
 std::string describeSpan(const KnownDoppler& span) {
   if (span.source == DopplerSource::kUnknown) return "none seen";
   return fixedText(span.value, 3) + " m/s, " +
-         (span.source == DopplerSource::kGiven ? "given" : "from the data: faster points come back");
+         (span.source == DopplerSource::kGiven ? "given"
+                                               : "from the data: faster points appear at its other end");
 }
 
 /// "3 late, 1 empty"
@@ -49,7 +50,7 @@ void describePasses(const RadarSummary& radar, const Row& row) {
   row("after passes", offsets + " ms");
 }
 
-/// The mounting as people can compare it: how far it went from the one configured, by the axes of the IMU.
+/// Describes how far the estimate moved the mounting from the configured one, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
   if (!extrinsics.rotationSigma().isZero())
     row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.configured, extrinsics.T_IR), 2, " ") +
@@ -91,7 +92,7 @@ void describeAids(const RunSummary& summary, const Row& row) {
   }
 }
 
-/// Tells of the windows that did not converge.
+/// Describes the windows that did not converge.
 void describeSolver(const Counts& terminations, const Row& row) {
   std::uint64_t windows = 0;
   for (const auto& [reason, count] : terminations) windows += count;
@@ -145,13 +146,16 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
                         std::to_string(summary.reinitializations) + " times, at the end " +
                         toString(summary.health));
   }
-  for (const RadarSummary& radar : summary.radars) {
-    if (one_radar) break;
-    table += "  radar " + radar.name + "\n";
-    const auto indented = [&](const std::string& name, const std::string& value) { row("  " + name, value); };
-    describePasses(radar, indented);
-    describeRadar(radar, indented);
-    indented("scans", describeScans(radar.scans_used, radar.scans_total, radar.scans_rejected));
+  if (!one_radar) {
+    for (const RadarSummary& radar : summary.radars) {
+      table += "  radar " + radar.name + "\n";
+      const auto indented = [&](const std::string& name, const std::string& value) {
+        row("  " + name, value);
+      };
+      describePasses(radar, indented);
+      describeRadar(radar, indented);
+      indented("scans", describeScans(radar.scans_used, radar.scans_total, radar.scans_rejected));
+    }
   }
   row("speed", fixedText(summary.estimation_seconds, 2) + " s, " + fixedText(summary.realtime_factor, 0) +
                    " times real time");

@@ -11,7 +11,7 @@
 namespace rio_t {
 namespace {
 
-/// Up is one of the axes of the IMU, or near it: which one.
+/// Returns the axis of the IMU, with its sign, that is nearest to a direction.
 Eigen::Vector3d nearestAxis(const Eigen::Vector3d& direction) {
   int axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
@@ -24,20 +24,21 @@ std::string axisName(const Eigen::Vector3d& direction) {
   return std::string(direction[axis] < 0.0 ? "-" : "+") + "xyz"[axis];
 }
 
-/// The samples that are not out of place by their stamps, and why the others are.
+/// The samples whose stamps are in order, and counts of the others.
 struct StampedInOrder {
   ImuTopic kept;
   std::size_t zero = 0, duplicates = 0, ahead = 0, behind = 0;
-  bool jumped = false;  ///< the clock
+  bool jumped = false;  ///< the clock jumped
 };
 
-/// A pause of the IMU: the records have it, too. If the clock jumped, they do not.
+/// Whether the IMU paused between two messages. Then the record times show the pause, too; if the clock
+/// jumped, they do not.
 bool isPause(const MessageTimes& before, const MessageTimes& after, double tolerance) {
   const double step = after.stamp - before.stamp;
   return step > 0.0 && std::abs(after.record - before.record - step) < tolerance;
 }
 
-/// Drops what the odometry drops. If the clock jumps, the longest part without a jump is kept.
+/// Drops the samples that the odometry drops. If the clock jumps, keeps the longest part without a jump.
 StampedInOrder stampedInOrder(const ImuTopic& topic) {
   const ImuInputCheckOptions odometry;
   ClockJumpDetector stamps(odometry.max_bridged_gap, odometry.jump_patience);
@@ -93,7 +94,7 @@ void describeOrder(const StampedInOrder& order, std::size_t messages, ImuInspect
                              std::to_string(messages) + " samples: " + why);
 }
 
-/// Why the stamps cannot be used; empty: they can, but for a few.
+/// Says why the stamps cannot be used; empty if all but a few can.
 std::string faultOf(const StreamTiming& timing) {
   if (10 * timing.zero >= timing.messages)
     return std::to_string(timing.zero) + " of " + std::to_string(timing.messages) + " stamps are zero";
@@ -161,13 +162,14 @@ void describeRest(ImuInspection* imu) {
   }
 }
 
-/// base_link is the IMU by default, and REP-103 wants it with z up.
+/// Reports an IMU whose z axis is not up: base_link is the IMU by default, and REP-103 wants base_link with z
+/// up.
 void describeUp(ImuInspection* imu) {
   const std::optional<Eigen::Vector3d> up = upOf(imu->report);
   if (!up) return;
   const Eigen::Vector3d axis = nearestAxis(*up);
   if (axis.z() > 0.0) return;
-  // Half a turn about x leaves x forward.
+  // A half turn about x keeps x forward.
   const Eigen::Quaterniond q_BI = axis.z() < 0.0
                                       ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
                                       : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
@@ -192,8 +194,8 @@ void describeNoise(ImuInspection* imu) {
                 (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
                 fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
                 (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
-  // The diagnosis doubts a run only if the IMU is noisier than configured.
-  constexpr double kMost = 10.0;  // [m/s^2/sqrt(Hz)] that the parameter takes
+  // A quiet IMU needs no key, since the diagnosis warns only about an IMU that is noisier than configured.
+  constexpr double kMost = 10.0;  // [m/s^2/sqrt(Hz)] largest value of the parameter
   if (vibrates)
     imu->keys.set("imu_accel_noise_density",
                   ParameterValue{rounded(std::min(r.accel_density_median, kMost), 1e3)},
@@ -207,7 +209,7 @@ void describeNoise(ImuInspection* imu) {
 void describe(ImuInspection* imu) {
   const ImuReport& r = imu->report;
   const std::size_t samples = r.samples.size() + r.not_finite + r.repeated;
-  if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
+  if (10 * r.not_finite > samples) {  // the report would describe only the rest
     imu->missing("IMU",
                  std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite",
                  "Correct the IMU driver, which writes NaN or infinity, and record again.");
@@ -228,7 +230,7 @@ void describe(ImuInspection* imu) {
 }  // namespace
 
 std::optional<Eigen::Vector3d> upOf(const ImuReport& report) {
-  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
+  constexpr double kMostlyUp = 7.5;  // [m/s^2] if the mean is shorter, the IMU turns over
   const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
   if (report.mean_acceleration.norm() <= kMostlyUp || up.norm() <= kMostlyUp) return std::nullopt;
   return up.normalized();

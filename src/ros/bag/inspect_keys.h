@@ -16,15 +16,15 @@ struct ProposedKey {
   std::string why;
 };
 
-/// Keys of one level, each once, in the order in which they came.
+/// Keys of one level: each key once, in the order of their first appearance.
 class ProposedKeys {
  public:
-  /// The later value holds.
+  /// Replaces an earlier value of the key.
   void set(const std::string& key, ParameterValue value, const std::string& why = "");
   void set(const std::string& key, const std::string& text, const std::string& why = "");
   void add(const ProposedKeys& other);
   void remove(const std::string& key);
-  /// Null if it is not there; valid until the keys change.
+  /// Null for a key that is not there; valid until the keys change.
   const ProposedKey* find(const std::string& key) const;
   const std::vector<ProposedKey>& all() const { return keys_; }
 
@@ -44,19 +44,21 @@ bool isConfigured(const std::string& key, const ParameterEntries& configured);
 /// Whether the key belongs to one bag, and so not to a configuration for the next ones.
 bool isOfOneBag(const std::string& key);
 
-/// To the nearest of the numbers that lie 1 / `per` apart; never minus zero.
+/// Rounds to a multiple of 1 / `per`; never minus zero.
 double rounded(double value, double per);
 
-/// Each line of `text` as a comment; a file name may hold what would end one.
+/// Makes each line of `text` a comment. Replaces control characters: a file name may hold some, and one could
+/// end the comment.
 std::string commented(const std::string& text, const std::string& indent);
 
-/// All keys, one a line, each after its reason as a comment.
+/// One line for each key, with its reason as a comment above.
 std::string toYaml(const ProposedKeys& keys, const std::string& indent);
 
-/// As a file: the keys that differ from the defaults, each with a comment. `header`: lines for its beginning.
+/// The text of a file with the keys that differ from the defaults, each with a comment. `header`: lines for
+/// its beginning.
 std::string toYaml(const ProposedConfig& proposed, const std::string& header);
 
-/// The file as the programs read it; throws ConfigError.
+/// Reads the text of a file as the programs do. Throws ConfigError.
 Config readBack(const std::string& yaml);
 
 }  // namespace rio_t

@@ -14,7 +14,7 @@ namespace rio_t {
 namespace {
 
 constexpr double kStraight = M_PI;     // [rad]
-constexpr double kOnePercent = 0.005;  // rounded
+constexpr double kOnePercent = 0.005;  // smallest share that is shown as 1 %
 
 std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
@@ -48,7 +48,8 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
   return options;
 }
 
-struct Looked {
+/// What the clouds of a radar show with one format.
+struct RadarAnalysis {
   DecodedClouds clouds;
   std::vector<RadarScan> scans;  // those that get a stamp
   CloudReport cloud;
@@ -58,34 +59,36 @@ struct Looked {
   MountingSearch search;
 };
 
-Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
-            const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
-  Looked looked;
-  looked.clouds = decodeAll(cloud, format);
-  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, looked.clouds.scans);
-  looked.cloud = inspectCloud(looked.scans);
-  looked.velocities = radarVelocities(looked.scans);
-  looked.sign = dopplerSignFromRanges(looked.scans, track);
-  looked.ratio = rangeRatio(looked.scans, track);
-  looked.search =
-      searchMounting(looked.velocities.velocities, track, searchOptions(imu, track, looked.sign.sign));
-  return looked;
+RadarAnalysis analyse(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
+                      const StampProposal& stamps, const PointCloudFormat& format,
+                      const InertialTrack& track) {
+  RadarAnalysis analysis;
+  analysis.clouds = decodeAll(cloud, format);
+  analysis.scans = stampScans(recording, imu.times, cloud, stamps.options, analysis.clouds.scans);
+  analysis.cloud = inspectCloud(analysis.scans);
+  analysis.velocities = radarVelocities(analysis.scans);
+  analysis.sign = dopplerSignFromRanges(analysis.scans, track);
+  analysis.ratio = rangeRatio(analysis.scans, track);
+  analysis.search =
+      searchMounting(analysis.velocities.velocities, track, searchOptions(imu, track, analysis.sign.sign));
+  return analysis;
 }
 
-/// Why the radar cannot be used; empty: it can.
-std::string faultOf(const Looked& looked, const PointCloudFormat& format, const StampProposal& stamps) {
-  if (looked.clouds.points == 0 && looked.clouds.points_not_finite > 0)
+/// Says why the radar cannot be used; empty: it can.
+std::string faultOf(const RadarAnalysis& analysis, const PointCloudFormat& format,
+                    const StampProposal& stamps) {
+  if (analysis.clouds.points == 0 && analysis.clouds.points_not_finite > 0)
     return "the position, the power or the field " + format.doppler + " is not finite in every point";
-  if (looked.clouds.points == 0)
-    return looked.clouds.padding > 0 ? "every point is at range zero, or NaN" : "no cloud has a point";
-  if (looked.scans.empty()) return "no scan gets a stamp: " + stamps.text;
-  if (!looked.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
+  if (analysis.clouds.points == 0)
+    return analysis.clouds.padding > 0 ? "every point is at range zero, or NaN" : "no cloud has a point";
+  if (analysis.scans.empty()) return "no scan gets a stamp: " + stamps.text;
+  if (!analysis.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
   return "";
 }
 
-void describeCloud(const Looked& looked, const FormatProposal& format, const StreamTiming& timing,
+void describeCloud(const RadarAnalysis& analysis, const FormatProposal& format, const StreamTiming& timing,
                    RadarInspection* radar) {
-  const CloudReport& c = looked.cloud;
+  const CloudReport& c = analysis.cloud;
   radar->tell(
       timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
       radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
@@ -94,9 +97,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
                                      : "") +
           ", " + format.power);
   for (const std::string& odd : format.odd) radar->odd("format", odd);
-  const KnownDoppler& step = looked.velocities.doppler_step;
+  const KnownDoppler& step = analysis.velocities.doppler_step;
   const bool sparse = radar->isSparse();
-  constexpr double kManyEmpty = 0.2;  // a radar that leaves out what stands still sees nothing at rest
+  constexpr double kManyEmpty =
+      0.2;  // fewer are usual: a radar that drops static points sees nothing at rest
   const bool often_empty = c.empty > kManyEmpty;
   radar->tell(sparse || often_empty ? FindingLevel::kOdd : FindingLevel::kOk, "points",
               fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " +
@@ -111,7 +115,7 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   constexpr double kIncredible = 500.0;  // [m] farther than radars see
   if (c.range_99 > kIncredible)
     radar->odd("points", "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
-  const double not_finite = static_cast<double>(looked.clouds.points_not_finite);
+  const double not_finite = static_cast<double>(analysis.clouds.points_not_finite);
   const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
   if (share_not_finite > kOnePercent)
     radar->odd("points",
@@ -123,7 +127,7 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
         "points",
         fixedText(100.0 * c.ambiguous, 0) +
             " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
-  if (!looked.velocities.has_elevation)
+  if (!analysis.velocities.has_elevation)
     radar->odd("points",
                "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
 }
@@ -139,13 +143,13 @@ void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
               "The radar sees farther than " + fixedText(max_range, 0) + " m.");
 }
 
-void describeSign(const Looked& looked, const FormatProposal& format, const ImuReport& imu,
+void describeSign(const RadarAnalysis& analysis, const FormatProposal& format, const ImuReport& imu,
                   RadarInspection* radar) {
-  const MountingSearch& search = looked.search;
+  const MountingSearch& search = analysis.search;
   const std::string field = format.format.doppler;
   std::string evidence;
-  if (looked.sign.sign != 0)
-    appendItem(&evidence, "ranges (" + fixedText(std::abs(looked.sign.significance), 0) + " sigma)");
+  if (analysis.sign.sign != 0)
+    appendItem(&evidence, "ranges (" + fixedText(std::abs(analysis.sign.significance), 0) + " sigma)");
   if (search.enough && search.sign_significance > 25.0)
     appendItem(&evidence, "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)",
                " and ");
@@ -153,7 +157,7 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
     radar->odd(
         "axes",
         "the ranges say that " + field + " is " +
-            (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+            (analysis.sign.sign > 0 ? "positive for receding" : "negative for receding") +
             " targets, the IMU the contrary. Either the axes of the cloud are left-handed (one axis is "
             "inverted): radar_doppler_sign and the mounting stand for it. Or the accelerometer is "
             "negated (it measures gravity, not the specific force): then the track is a mirror image, "
@@ -174,10 +178,10 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
   }
 }
 
-/// Whether the ranges change at the rate that the Doppler says, whatever its sign.
+/// Reports if the ranges do not change at the rate that the Doppler says, whatever its sign.
 void describeUnit(const RangeRatio& ranges, const std::string& field, RadarInspection* radar) {
-  // On gentle motions the ratio comes out up to 1.3 for a right Doppler. A wrong unit is farther off: knots
-  // are nearest, with 1.94.
+  // On gentle motions a correct Doppler gives ratios up to 1.3. Wrong units are farther off: the nearest are
+  // knots, with 1.94.
   constexpr double kFactor = 1.5, kSigmas = 3.0;
   if (ranges.ratio == 0.0) return;
   if (std::abs(std::log(ranges.ratio)) <= std::max(std::log(kFactor), kSigmas * ranges.log_sigma)) return;
@@ -186,13 +190,14 @@ void describeUnit(const RangeRatio& ranges, const std::string& field, RadarInspe
                             field + " in m/s? The odometry takes it as m/s, and no parameter scales it");
 }
 
-/// A radar without elevation hardly shows its tilt, and most of them are mounted level.
+/// Returns the mounting without tilt. A radar without elevation hardly shows its tilt, and most are mounted
+/// level.
 Eigen::Quaterniond levelled(const Eigen::Quaterniond& q_IR) {
   const double roll = std::abs(mountingOf(q_IR).roll) > 0.5 * kStraight ? kStraight : 0.0;
   return rotationOf({mountingOf(q_IR).yaw, 0.0, roll});
 }
 
-/// The 24 turns in words: where the axes of the radar point.
+/// Says along which axes of the IMU the axes of the radar point. `turn`: one of axisTurns().
 std::string turnText(const Eigen::Matrix3d& turn) {
   std::string text;
   const std::array<const char*, 3> names = {"right", "forward", "up"};
@@ -250,7 +255,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
   std::string sure = sureness(sigma);
-  // Few points a scan may show another mounting that fits as well: upside down, or a view beside the motion.
+  // If the scans have few points, another mounting may fit as well: upside down, or beside the motion.
   const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn && !radar->isSparse();
   if (radar->isSparse()) appendItem(&sure, "so few points may show a wrong one", "; ");
   if (!observed) appendItem(&sure, "compare it with the robot", "; ");
@@ -289,8 +294,8 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
                     "Found roughly, in seconds.");
 }
 
-/// The configuration keeps what the user has configured. The report says if the bag clearly shows something
-/// else.
+/// The configuration keeps what the user has configured. The report says so if the bag clearly shows
+/// something else.
 void compareWithConfigured(const MountingSearch& search, const ParameterEntries& configured,
                            RadarInspection* radar) {
   if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
@@ -324,36 +329,37 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   }
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud, configured);
   const InertialTrack track(imu.report.samples, imu.report.rest_rate);
-  Looked looked = look(recording, imu, cloud, stamps, format.format, track);
-  if (const std::string fault = faultOf(looked, format.format, stamps); !fault.empty()) {
+  RadarAnalysis analysis = analyse(recording, imu, cloud, stamps, format.format, track);
+  if (const std::string fault = faultOf(analysis, format.format, stamps); !fault.empty()) {
     const char* const to_do =
         "Set stamp_source to header or to arrival, or leave it out: check_bag then chooses.";
-    radar.missing("radar", cloud.topic + ": " + fault, looked.scans.empty() ? to_do : "");
+    radar.missing("radar", cloud.topic + ": " + fault, analysis.scans.empty() ? to_do : "");
     return radar;
   }
-  // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
-  // two: two fields are swapped.
-  const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
-  if (correctAxes(looked.cloud, mirrored, configured, &format))
-    looked = look(recording, imu, cloud, stamps, format.format, track);
+  // If the ranges do not show the sign, a contrary sign and a radar that looks along another axis are one
+  // fault: two fields are swapped.
+  const bool mirrored = analysis.search.mirrored || (analysis.sign.sign == 0 && analysis.search.sign == -1);
+  if (correctAxes(analysis.cloud, mirrored, configured, &format))
+    analysis = analyse(recording, imu, cloud, stamps, format.format, track);
   const std::optional<Eigen::Vector3d> up = upOf(imu.report);
-  constexpr double kUpright = 0.9;  // cosine: z of the IMU is up, as the words for a mounting have it
-  if (!looked.velocities.has_elevation && looked.search.enough && up && up->z() > kUpright)
-    looked.search.q_IR = levelled(looked.search.q_IR);
+  constexpr double kUpright =
+      0.9;  // cosine of the largest tilt of the IMU: mounting angles assume that its z is up
+  if (!analysis.velocities.has_elevation && analysis.search.enough && up && up->z() > kUpright)
+    analysis.search.q_IR = levelled(analysis.search.q_IR);
   radar.usable = true;
-  radar.search = looked.search;
-  radar.points = looked.cloud.points_50;
+  radar.search = analysis.search;
+  radar.points = analysis.cloud.points_50;
   radar.keys.set("radar_topic", cloud.topic);
   radar.keys.add(format.keys);
   radar.keys.add(stamps.keys);
-  limitsOfCloud(looked.cloud, &radar.keys);
-  describeCloud(looked, format, timing, &radar);
+  limitsOfCloud(analysis.cloud, &radar.keys);
+  describeCloud(analysis, format, timing, &radar);
   for (const std::string& odd : stamps.odd) radar.odd("stamps", odd);
   if (stamps.odd.empty()) radar.ok("stamps", stamps.text);
-  describeSign(looked, format, imu.report, &radar);
-  describeUnit(looked.ratio, format.format.doppler, &radar);
-  describeMounting(looked.search, makeConfig(configured).odometry.smoother.max_time_offset, &radar);
-  compareWithConfigured(looked.search, configured, &radar);
+  describeSign(analysis, format, imu.report, &radar);
+  describeUnit(analysis.ratio, format.format.doppler, &radar);
+  describeMounting(analysis.search, makeConfig(configured).odometry.smoother.max_time_offset, &radar);
+  compareWithConfigured(analysis.search, configured, &radar);
   return radar;
 }
 

@@ -17,24 +17,24 @@ namespace rio_t {
 /// "100 Hz, gaps: 2 (longest 0.50 s), duplicate stamps: 3"
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates);
 
-/// The IMU of a recording, ready to be compared with radars.
+/// An IMU of a recording.
 struct ImuInspection : Findings {
   std::string topic;
-  std::vector<MessageTimes> times;  ///< of the samples whose stamps are in place
+  std::vector<MessageTimes> times;  ///< of the samples whose stamps are in order
   ImuReport report;
   ProposedKeys keys;
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
 
-/// Up in I, unless the IMU turns over so much that no direction is up on average.
+/// The direction that points up in I. None if the IMU turns over so much that no direction is up on average.
 std::optional<Eigen::Vector3d> upOf(const ImuReport& report);
 
-/// How to tell whether the accelerometer is negated. The data cannot: gravity shows it to a person only.
+/// Says how a person can tell whether the accelerometer is negated. The data alone cannot show it.
 std::string howToTellNegated(const ImuReport& report);
 
-/// [rad] Sigma of a turn below which the bag shows it.
+/// [rad] The bag shows a rotation about an axis if its sigma is below this.
 constexpr double kObservedTurn = 0.3;
-/// [rad] 15 degrees between two mountings: an eye does not misjudge one by more.
+/// [rad] 15 degrees: nobody misjudges a mounting by more by eye.
 constexpr double kFarApart = 0.26;
 
 /// A radar of a recording.
@@ -43,14 +43,14 @@ struct RadarInspection : Findings {
   ProposedKeys keys;
   bool usable = false;
   MountingSearch search;
-  double points = 0.0;  ///< of the median scan
+  double points = 0.0;  ///< in the median scan
 
-  /// The mounting may be far off, whatever its sigma.
+  /// Whether the scans have so few points that the mounting may be far off, whatever its sigma.
   bool isSparse() const { return points < kSparsePoints; }
 };
 /// Whether the user has configured the rotation of the mounting.
 bool isMountingConfigured(const ParameterEntries& configured);
-/// The cloud is read as the user has `configured`.
+/// Inspects a radar. Reads its clouds as the user has `configured`.
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
                              const ParameterEntries& configured);
 

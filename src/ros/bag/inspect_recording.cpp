@@ -62,7 +62,8 @@ void readMessages(rosbag::View& view, const ParameterEntries& configured, Record
       topic.publishers.add(instance.getCallerId(), topic.messages.back()->header.frame_id);
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;
-      // One cloud with points tells why a topic cannot serve. More of a lidar would fill the memory.
+      // The first cloud with points shows whether the topic can serve. All clouds of a lidar would fill the
+      // memory.
       const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
       if (is_first && !proposeFormat(topic, configured).fault.empty()) refused.insert(name);
     } else {

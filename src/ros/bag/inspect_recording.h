@@ -12,12 +12,12 @@
 #include "rio_t/inspection/stream_timing.h"
 #include "rio_t/ros/bag/check_bag.h"
 
-/// A bag as an inspection reads it: every topic that may serve.
+/// The recording that check_bag inspects, with every topic that may serve.
 namespace rio_t {
 
 struct ImuTopic {
   std::string topic;
-  std::vector<ImuMeasurement> written;  ///< in the units of the driver; those with a stamp of zero, too
+  std::vector<ImuMeasurement> written;  ///< in the units of the driver, including those with a stamp of zero
   std::vector<MessageTimes> times;
   Publishers publishers;
 };
@@ -26,7 +26,7 @@ struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;
   std::vector<MessageTimes> times;
-  std::uint64_t copies = 0;  ///< messages that are the same as the one before
+  std::uint64_t copies = 0;  ///< messages that equal the one before
   Publishers publishers;
 };
 
@@ -37,10 +37,10 @@ struct HeaderTopic {
 };
 
 struct Recording {
-  std::vector<std::string> bags;             ///< its parts
+  std::vector<std::string> bags;             ///< the parts of the recording
   std::map<std::string, std::string> types;  ///< of all topics
   double length = 0.0;                       ///< [s] of the bag
-  double read = 0.0;                         ///< [s] of it that was read
+  double read = 0.0;                         ///< [s] of the bag that were read
   std::vector<ImuTopic> imus;
   std::vector<CloudTopic> clouds;
   std::vector<HeaderTopic> headers;

@@ -12,8 +12,10 @@
 namespace rio_t {
 namespace {
 
-constexpr double kLargestDelay = 1.0;  // [s] of a scan, in the IMU's clock: more, and the clocks differ
-constexpr double kAhead = 0.02;  // [s] before its stamp that a scan may arrive: clocks that agree differ less
+constexpr double kLargestDelay =
+    1.0;  // [s] from the stamp of a scan to its arrival; if it is longer, the clocks differ
+constexpr double kAhead =
+    0.02;  // [s] from the arrival of a scan to its stamp; if it is longer, the clocks differ
 
 std::string milliseconds(double seconds) { return fixedText(1e3 * seconds, 0) + " ms"; }
 
@@ -30,8 +32,8 @@ std::size_t sharedWords(const std::string& a, const std::string& b) {
       of_a.begin(), of_a.end(), [&](const std::string& word) { return of_b.count(word) != 0; }));
 }
 
-/// The header topic that stamps most of the scans, if it stamps eight in ten, and none more than `bound`
-/// ahead of its arrival.
+/// Returns the header topic whose name shares the most words with that of the cloud; of equals, the one that
+/// stamps more scans. It stamps eight scans in ten or more, and is at most `bound` ahead of its arrival.
 const HeaderTopic* triggerOf(const Recording& recording, const std::vector<MessageTimes>& imu,
                              const CloudTopic& cloud, double bound) {
   const HeaderTopic* best = nullptr;
@@ -118,14 +120,15 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
   if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud, bound)) {
     options.source = StampSource::kTrigger;
     options.trigger_topic = trigger->topic;
-    proposal.keys.set("stamp_source", "trigger", "By itself " + fault + ".");
+    proposal.keys.set("stamp_source", "trigger", "The stamps of the clouds cannot be used: " + fault + ".");
     proposal.keys.set("trigger_topic", trigger->topic);
     proposal.text = "stamps of the trigger " + trigger->topic;
     proposal.odd.push_back(fault + "; stamp_source: trigger takes those of " + trigger->topic);
   } else {
     options.source = StampSource::kArrival;
     proposal.keys.set("stamp_source", "arrival",
-                      "By itself " + fault + ". The delay is part of the time offset, which is estimated.");
+                      "The stamps of the clouds cannot be used: " + fault +
+                          ". The delay is part of the time offset, which is estimated.");
     proposal.text = "stamps from the arrival";
     proposal.odd.push_back(fault +
                            "; stamp_source: arrival is used, and the delay is estimated as the time offset");
@@ -145,7 +148,7 @@ std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<
     try {
       message();
     } catch (const std::exception&) {
-      // A stamp of zero among good ones.
+      // A stamp of zero among valid ones.
     }
   };
   std::vector<RadarScan> stamped;

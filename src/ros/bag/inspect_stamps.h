@@ -10,7 +10,7 @@
 
 namespace rio_t {
 
-/// Where the stamps of a radar come from, and the scans with them.
+/// The source of the stamps that fits a radar.
 struct StampProposal {
   ProposedKeys keys;
   StampingOptions options;
@@ -18,12 +18,13 @@ struct StampProposal {
   std::vector<std::string> odd;  ///< sentences
 };
 
-/// Chooses stamp_source for a cloud, unless the user has `configured` it. No stamp of the IMU may be out of
-/// place.
+/// Chooses stamp_source for a cloud, unless the user has `configured` it. `imu` must have no stamps that are
+/// out of place.
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
                             const CloudTopic& cloud, const ParameterEntries& configured);
 
-/// Stamps scans as the programs would. `scans`: one for each message of the topic.
+/// Stamps scans as the programs would. `scans`: one for each message of the topic. Returns those that get a
+/// stamp.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
                                   const CloudTopic& cloud, const StampingOptions& options,
                                   const std::vector<RadarScan>& scans);

@@ -7,7 +7,7 @@ namespace rio_t {
 namespace {
 
 constexpr std::uint64_t kEnoughMessages = 10, kEnoughTurns = 20;
-constexpr std::size_t kMostPublishers = 16;  // a frame_id may count on from message to message
+constexpr std::size_t kMostPublishers = 16;  // bounds the memory: some drivers count messages in the frame_id
 
 }  // namespace
 

@@ -10,10 +10,11 @@ namespace rio_t {
 /// Counts who publishes on one topic of a bag. Two nodes on one topic look like one sensor that jumps.
 class Publishers {
  public:
-  /// A message. `caller`: the node, as the bag has it, or empty; `frame`: the frame_id of its header.
+  /// Counts a message. `caller`: the node, if the bag names it; `frame`: the frame_id of its header.
   void add(const std::string& caller, const std::string& frame);
-  /// A sentence that names them if there are several; else empty. A node that starts again under another
-  /// name, or one message among many, is no second publisher: their messages must come by turns.
+  /// Returns a sentence that names the publishers if there are several, else nothing. Their messages must
+  /// alternate: a node that starts again under another name, or one message among many, is no second
+  /// publisher.
   std::string describeSeveral(const std::string& topic) const;
 
  private:

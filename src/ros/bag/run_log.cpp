@@ -5,7 +5,7 @@
 namespace rio_t {
 namespace {
 
-/// The estimates of a radar before its first scan: what was configured.
+/// Returns the estimates of a radar before its first scan, which are the configured values.
 RadarEstimate before(const SmootherOptions& smoother, const CalibrationPrior& configured) {
   RadarEstimate radar;
   radar.final_offset_s = configured.time_offset_initial;
@@ -21,15 +21,15 @@ RadarEstimate before(const SmootherOptions& smoother, const CalibrationPrior& co
 
 }  // namespace
 
-RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off,
+RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& subtracted,
                bool keeps_trajectory)
     : output_(output),
       offset_shared_(config.odometry.smoother.time_offset_shared),
       keeps_trajectory_(keeps_trajectory) {
-  for (std::size_t k = 0; k < taken_off.size(); ++k) {
+  for (std::size_t k = 0; k < subtracted.size(); ++k) {
     Radar& radar = radars_.emplace_back(
-        Radar{before(config.odometry.smoother, config.odometry.ofRadar(k)), taken_off[k]});
-    radar.estimate.final_offset_s += radar.taken_off;
+        Radar{before(config.odometry.smoother, config.odometry.ofRadar(k)), subtracted[k]});
+    radar.estimate.final_offset_s += radar.subtracted;
   }
 }
 
@@ -42,9 +42,9 @@ void RunLog::addState(const NavigationState& state) {
 
 void RunLog::addResult(ScanResult& result) {
   Radar& radar = radars_.at(result.scan.radar);
-  if (radar.taken_off != 0.0) {
-    result.scan.stamp = result.scan.stamp + radar.taken_off;
-    if (result.updated) result.time_offset += radar.taken_off;
+  if (radar.subtracted != 0.0) {
+    result.scan.stamp = result.scan.stamp + radar.subtracted;
+    if (result.updated) result.time_offset += radar.subtracted;
   }
   if (output_ != nullptr) output_->addResult(result);
   for (const StampedPose& pose : result.left_window) {
@@ -52,7 +52,7 @@ void RunLog::addResult(ScanResult& result) {
       path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
     newest_optimized_ = pose;
   }
-  // The platform did not drive the step across a restart of the IMU's clock.
+  // The step across a restart of the IMU's clock is no part of the path.
   if (starts_again_ && !result.left_window.empty()) {
     newest_optimized_.reset();
     starts_again_ = false;

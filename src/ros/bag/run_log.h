@@ -9,20 +9,20 @@
 
 namespace rio_t {
 
-/// Writes the estimates of a run, and keeps the newest of them for its summary.
+/// Writes the estimates of a run, and keeps the newest for the summary.
 class RunLog {
  public:
-  /// `taken_off` [s], by radar: the stamps are earlier, and the offset smaller, by so much.
+  /// `subtracted` [s]: what was subtracted from the stamps of each radar, and so from its offset.
   /// `keeps_trajectory`: for takeTrajectory(), 90 MB an hour.
-  RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off,
+  RunLog(const Config& config, RunOutput* output, const std::vector<double>& subtracted,
          bool keeps_trajectory);
 
   void addState(const NavigationState& state);
-  /// The clock of the IMU jumped: the next optimised poses are the last ones from before.
+  /// Call it if the clock of the IMU jumped: the next optimised poses are the last from before the jump.
   void startAgain() { starts_again_ = true; }
-  /// Puts what was taken off the stamps back on.
+  /// Adds to stamp and offset of the result what was subtracted.
   void addResult(ScanResult& result);
-  /// Sets what the log knows.
+  /// Sets the estimates in the summary.
   void fill(RunSummary* summary) const;
   /// The poses at the IMU samples; empty if they are not kept.
   Trajectory takeTrajectory() { return std::move(trajectory_); }
@@ -30,7 +30,7 @@ class RunLog {
  private:
   struct Radar {
     RadarEstimate estimate;
-    double taken_off = 0.0;
+    double subtracted = 0.0;
   };
 
   RunOutput* output_;

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
 
-/// The files of the run before, as its summary names them.
+/// Returns the files of the run before, as its summary names them.
 std::vector<std::string> savedBefore(const std::string& folder) {
   try {
     return YAML::LoadFile(folder + "/summary.yaml")["saved"].as<std::vector<std::string>>();
@@ -30,7 +30,7 @@ std::vector<std::string> savedBefore(const std::string& folder) {
   }
 }
 
-/// Says what became of a scan. If its points agree on no velocity, they may still count one by one.
+/// Says what became of a scan. If its points agree on no velocity, each point may still count.
 std::string statusOf(const ScanResult& result) {
   if (!result.used) return result.rejected_because;
   const EgoVelocityStatus status = result.ego_velocity.status;
@@ -132,7 +132,7 @@ void RunOutput::File::flushIfFull() {
 }
 
 FolderLock::FolderLock(const std::string& folder) : descriptor_(open(folder.c_str(), O_RDONLY | O_CLOEXEC)) {
-  // Some file systems know no locks.
+  // Some file systems have no locks.
   if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   close(descriptor_);
   throw OutputError("output folder " + folder + ": another run writes there; expected a folder of its own");
@@ -180,7 +180,7 @@ void RunOutput::addPose(std::string_view name, const StampedPose& pose) {
 
 void RunOutput::addState(const NavigationState& state) {
   addPose("trajectory.txt", {state.time, state.p_W, state.q_WI});
-  // Also where time runs back (a bag that loops): a line, then ten a second again.
+  // If the time runs back (a bag that loops), a line comes at once, then ten a second again.
   if (last_navigation_ && std::abs(state.time - *last_navigation_) < kNavigationPeriod) return;
   last_navigation_ = state.time;
   const Eigen::Matrix<double, 6, 1> pose = sigmasOf(bodyOdometry(state, 0.0).pose_covariance);

@@ -63,7 +63,7 @@ std::vector<float> tiMmwaveValues(const SimulatedPoint& p) {
           static_cast<float>(p.doppler)};
 }
 
-// Topics and frame of the only radar.
+// With the topics and the frames of a single radar.
 Layout layoutOf(BagFormat format) {
   if (format == BagFormat::kTiMmwave) {
     return {"/ti_mmwave/radar_scan_pcl",
@@ -88,7 +88,7 @@ Layout layoutOf(BagFormat format) {
       irsValues};
 }
 
-// Topics and frame of a radar with a name.
+// With the topics and the frames of a radar that has a name.
 Layout layoutOf(BagFormat format, const std::string& name) {
   Layout layout = layoutOf(format);
   const std::string radar = "radar_" + name;
@@ -179,7 +179,7 @@ geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, T
   return message;
 }
 
-// Something that arrives at the recorder, and how it is written.
+// A message that arrives at the recorder, and how to write it.
 struct Arrival {
   Time time;
   std::function<void(rosbag::Bag& bag, const ros::Time& record)> write;
@@ -189,7 +189,6 @@ std::vector<Arrival> arrivals(const simulation::Motion& motion, const simulation
                               const std::vector<RadarTrack>& radars, Time start,
                               const SimulationBagOptions& options) {
   std::vector<Arrival> all;
-  /// `make`: the message.
   const auto add = [&all](Time time, const std::string& topic, auto make) {
     all.push_back({time, [topic, make](rosbag::Bag& bag, const ros::Time& record) {
                      bag.write(topic, record, make());

@@ -6,7 +6,7 @@
 namespace rio_t {
 namespace {
 
-/// `values`: a vector, of Eigen or of the standard library.
+/// `values`: a vector of Eigen or of the standard library.
 template <typename Values>
 std::vector<std::string> fixedList(const Values& values, int decimals) {
   std::vector<std::string> texts;

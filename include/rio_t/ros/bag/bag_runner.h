@@ -19,7 +19,8 @@ struct BagRun {
   std::function<void(double)> progress;  ///< share of the bag done, 0 to 1; may be empty
 };
 
-/// A run that gave no result, with what its data show of the causes.
+/// runBag throws this if the odometry never starts or rejects every scan. The diagnosis has the likely
+/// causes.
 class RunFailed : public std::runtime_error {
  public:
   RunFailed(const std::string& what, Diagnosis diagnosis)
@@ -30,13 +31,13 @@ class RunFailed : public std::runtime_error {
   Diagnosis diagnosis_;
 };
 
-/// Plays the bags through the estimator as fast as it goes, in one thread, so that the same bag gives the
-/// same files. Needs no roscore. Throws std::runtime_error with one line that names the bag, topic, key or
-/// file that is wrong: bag missing or unreadable, topic missing or of another type, cloud not as configured,
-/// no data, output not writable; RunFailed: never initialised, every scan rejected.
+/// Plays the bags through the estimator as fast as the computer can, in one thread, so that the same bag
+/// gives the same files. Needs no roscore. Throws RunFailed, or std::runtime_error with one line that names
+/// the wrong bag, topic, key or file: bag missing or unreadable, topic missing or of another type, cloud not
+/// as configured, no data, output not writable.
 RunSummary runBag(const BagRun& run);
 
-/// A short table for people. `files` is the folder that it names.
+/// Returns the summary as a short table. `files`: the output folder, which the table names.
 std::string describeRun(const RunSummary& summary, const std::string& files);
 
 /// The program rio_t_bag: `words` are its arguments. Returns the exit status; what went wrong is reported in

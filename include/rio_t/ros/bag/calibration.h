@@ -13,8 +13,8 @@ namespace rio_t {
 struct CalibrationRun {
   std::vector<std::string> bags;  ///< paths
   std::string output_folder;      ///< gets a folder with the files of each bag's run; empty: no files
-  Config config;                  ///< what is configured
-  bool shows_progress = false;    ///< by a bar for each bag
+  Config config;
+  bool shows_progress = false;  ///< draws a progress bar for each bag
 };
 
 /// The outcome of one bag.
@@ -24,11 +24,11 @@ struct CalibrationBag {
   std::vector<std::string> warnings;
 };
 
-/// What the bags that count say of one radar.
+/// The calibration of one radar from all bags that count.
 struct CalibratedRadar {
-  std::string name;  ///< empty if there is but one
+  std::string name;  ///< empty if there is only one radar
   RadarCalibration calibration;
-  std::vector<OffsetEstimate> offsets;  ///< by bag that counts
+  std::vector<OffsetEstimate> offsets;  ///< one for each bag that counts
 };
 
 struct BagCalibration {
@@ -40,17 +40,18 @@ struct BagCalibration {
 /// fails, does not converge or diverged for most of its scans does not count.
 BagCalibration calibrateFromBags(const CalibrationRun& run);
 
-/// Why a run that ended does not count; empty if it does.
+/// Returns why a finished run does not count; empty if it counts.
 std::string failureOf(const RunSummary& summary);
 
-/// A table for people: what was configured and found, sigmas, verdicts, and what to move for what was not
-/// observed.
+/// Returns a table with the configured and the found values, sigmas and verdicts. If a value was not
+/// observed, it says which motion would show it.
 std::string describeCalibration(const BagCalibration& calibration);
 /// The part of one radar.
 std::string describeCalibration(const CalibratedRadar& radar);
 
-/// The configuration to use next time, as YAML: what the user gave, with offset and extrinsics of each radar
-/// replaced. `given`: the entries of file and command line that made `config`. A comment has the `name`.
+/// Returns the configuration to use next time, as YAML: what the user gave, with offset and extrinsics of
+/// each radar replaced. `given`: the entries of file and command line that made `config`. `name`: of that
+/// file, for a comment.
 std::string calibratedYaml(const BagCalibration& calibration, const Config& config,
                            const ParameterEntries& given, const std::string& name);
 

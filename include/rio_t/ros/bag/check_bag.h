@@ -8,17 +8,17 @@
 
 namespace rio_t {
 
-/// The recording, and where to write.
+/// What check_bag reads and writes.
 struct CheckRequest {
   std::vector<std::string> bags;          ///< paths
   std::string out;                        ///< gets the configuration; empty: none
   std::string rig;                        ///< PNG with the rig drawn; empty: none
   std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
-  ParameterEntries set;                   ///< what the user knows; the cloud is read accordingly
-  double duration = 120.0;                ///< [s] of each bag that are read; 0: all
-  bool bags_go_away = false;              ///< they are temporary: nobody can run on them afterwards
-  bool try_out = true;                    ///< whether the odometry runs on the bag with what is proposed
+  ParameterEntries set;                   ///< parameters that the user gives; the clouds are read with them
+  double duration = 120.0;                ///< [s] to read of each recording; 0: all of it
+  bool bags_go_away = false;              ///< the bags are temporary: they are gone when the program ends
+  bool try_out = true;  ///< whether to run the odometry on the bag with the proposed configuration
 };
 
 enum class FindingLevel {
@@ -34,7 +34,7 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// check_bag says this of a bag, an IMU or a radar.
+/// What check_bag found out about a bag, an IMU or a radar.
 struct Findings {
   std::vector<Finding> findings;
   std::string to_do;  ///< one sentence if something is missing

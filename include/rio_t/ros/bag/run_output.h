@@ -25,7 +25,7 @@ struct TruthErrors {
   std::optional<double> r_rel_deg;  ///< [deg/m] likewise
 };
 
-/// How the solver ended where the whole run was solved at once.
+/// How the solver of mode batch ended.
 struct BatchSummary {
   int iterations = 0;
   int placements = 0;  ///< how often the nodes were placed
@@ -42,23 +42,23 @@ struct NotUsable {
   std::string text() const { return why + " (messages: " + std::to_string(count) + ")"; }
 };
 
-/// The result of a run: what the diagnosis needs, and what the files and the people get besides.
+/// The result of a run: the evidence for the diagnosis, and what else the files and the table show.
 struct RunSummary : RunEvidence {
   explicit RunSummary(RunEvidence evidence = {}) : RunEvidence(std::move(evidence)) {}
 
   std::string mode = "online";
   std::optional<BatchSummary> batch;  ///< only with mode batch
-  std::vector<std::string> warnings;  ///< for people; not in the file
+  std::vector<std::string> warnings;  ///< for the user; not in the file
   std::vector<NotUsable> not_usable;  ///< likewise
   double path_length_m = 0.0;         ///< of the optimised poses
-  // The causal trajectory has these two only if it never starts again on the way (`imu_restarts`).
+  // Only if the trajectory never starts again (no `imu_restarts`), from its first to its last causal pose:
   double end_to_start_2d_m = 0.0;  ///< horizontal
   double end_to_start_3d_m = 0.0;
   std::optional<BarometerCounts> barometer;  ///< only with a barometer_topic
   Diagnosis diagnosis;                       ///< whether the run is good, and if not, why
   std::optional<TruthErrors> truth;          ///< none if the trajectory starts again
   double estimation_seconds = 0.0;           ///< reading, decoding and estimating, wall clock
-  double realtime_factor = 0.0;              ///< seconds of data in a second of that
+  double realtime_factor = 0.0;              ///< seconds of data per second of estimation_seconds
 
   // Over all radars.
   std::uint64_t scansTotal() const;
@@ -69,33 +69,33 @@ struct RunSummary : RunEvidence {
 /// The text of summary.yaml. `saved`: the files of the run.
 std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved);
 
-/// A file of a run, and how it begins.
+/// A file of a run and its header line, which may be empty.
 struct RunFile {
   std::string name, header;
 };
 
-/// Which files a run writes: those of a radar carry its name, unless there is but one.
+/// Says which files a run writes. With several radars, each radar has files of its own, which carry its name.
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
-  bool extrinsics = false;                 ///< they are estimated
-  bool barometer = false;                  ///< there is one
-  bool ground_vehicle = false;             ///< the platform is one
+  bool extrinsics = false;                 ///< the run estimates them
+  bool barometer = false;                  ///< the run has a barometer
+  bool ground_vehicle = false;             ///< the platform is a ground vehicle
   bool map = false;                        ///< landmarks are on
 
-  std::vector<RunFile> all() const;  ///< but for summary.yaml
+  std::vector<RunFile> all() const;  ///< all except summary.yaml
   std::vector<std::string> names() const;
 };
 /// The files of a run with this configuration.
 RunFiles runFiles(const Config& config);
 
-/// The files of a run cannot be written: the bag is not to blame.
+/// A file of the run cannot be written. The bag is not at fault.
 class OutputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Holds a folder for one run at a time, if the file system knows locks. Throws OutputError if another has
-/// it.
+/// Locks a folder, so that no two runs write there at once. Throws OutputError if another run has the lock.
+/// It has no effect on a file system without locks.
 class FolderLock {
  public:
   explicit FolderLock(const std::string& folder);
@@ -110,11 +110,11 @@ class FolderLock {
 /// The files of a run: docs/ros.md (Outputs) says what is in them. The same calls write the same bytes.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files. Throws OutputError naming what cannot be written, or if another
-  /// run writes there. It removes the files that an earlier run lists in its summary.yaml, so that they are
-  /// never taken for its own.
+  /// Makes the folder and opens the files. Throws OutputError if a file cannot be written, or if another run
+  /// writes there. Removes the files that summary.yaml of an earlier run lists, so that nobody takes them for
+  /// files of this run.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
-  /// If the run failed, this saves its tables as far as they go. Such a run has no summary.yaml.
+  /// Saves the tables of a run that failed, as far as they go. Such a run has no summary.yaml.
   ~RunOutput();
   RunOutput(const RunOutput&) = delete;
   RunOutput& operator=(const RunOutput&) = delete;
@@ -125,7 +125,7 @@ class RunOutput {
   void finish(const RunSummary& summary);
 
  private:
-  /// A table with a large buffer of its own. A line gets its columns one after the other.
+  /// A table with a large buffer. The columns of a line are added one after the other.
   struct File {
     std::string path;
     std::ofstream stream;
@@ -143,7 +143,7 @@ class RunOutput {
   };
 
   File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
-  File& row(std::string_view name, Time stamp);                           // of that file
+  File& row(std::string_view name, Time stamp);                           // begins a line of that file
   void addAids(const ScanResult& result);
   void addPose(std::string_view name, const StampedPose& pose);
 
@@ -151,7 +151,7 @@ class RunOutput {
   RunFiles files_;
   std::optional<FolderLock> lock_;
   std::map<std::string, File, std::less<>> open_;     // by name
-  std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
+  std::map<std::uint64_t, LandmarkPoint> landmarks_;  // every landmark of the run, by id, in its last state
   std::optional<Time> last_navigation_;               // of the last line in navigation.csv
 };
 
