@@ -26,12 +26,6 @@ const PointCloud2* example(const CloudTopic& topic) {
   return nullptr;
 }
 
-std::vector<std::string> fieldsOf(const PointCloud2& message) {
-  std::vector<std::string> names;
-  for (const sensor_msgs::PointField& field : message.fields) names.push_back(field.name);
-  return names;
-}
-
 /// The field of that name, in capitals or not.
 std::string fieldNamed(const std::vector<std::string>& fields, const std::string& name) {
   for (const std::string& field : fields) {
@@ -40,8 +34,8 @@ std::string fieldNamed(const std::vector<std::string>& fields, const std::string
   return "";
 }
 
-/// The field that has one of the words as its name, or else the first whose name contains one. It must be
-/// none of `taken`, and no standard deviation and the like.
+/// Returns the field that has one of the words as its name, or else the first whose name contains one. It is
+/// none of `taken`, and no standard deviation or the like.
 std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words,
                       const std::vector<std::string>& taken = {}) {
   for (const std::string& word : words) {
@@ -59,7 +53,7 @@ std::string fieldLike(const std::vector<std::string>& fields, const std::vector<
   return "";
 }
 
-/// Values of one field in the whole recording: a format reads any field as the Doppler.
+/// Returns all values of one field. The decoder reads the field as if it were the Doppler.
 std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, const std::string& field) {
   format.doppler = field;
   format.doppler_sign = 1;
@@ -71,7 +65,7 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
   return values;
 }
 
-/// Nobody's preset: names, one by one, unless the user has `configured` them.
+/// Guesses the names of the fields if no preset fits. The names that the user has `configured` stay.
 void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrides& configured,
                  FormatProposal* proposal) {
   const auto either = [](const std::string& name, const std::string& guess) {
@@ -242,7 +236,7 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& co
   }
   const PointCloudOverrides known = makeConfig(configured).radar_overrides;
   const bool format_is_configured = isConfigured("radar_format", configured);
-  const std::vector<std::string> fields = fieldsOf(*message);
+  const std::vector<std::string> fields = fieldNames(*message);
   proposal.fields = boost::algorithm::join(fields, ", ");
   proposal.fitting = fittingPresets(*message);
   if (proposal.fitting.empty() && !format_is_configured) {
@@ -280,8 +274,9 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& co
 
 bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& configured,
                  FormatProposal* proposal) {
-  constexpr double kLooks = 0.4;  // length of the mean direction from which on a radar looks somewhere
-  constexpr double kWider = 1.5;  // by which a field of view is wider in azimuth than in elevation
+  constexpr double kLooks = 0.4;  // a mean direction that is longer than this shows where the radar looks
+  constexpr double kWider =
+      1.5;  // a usual field of view is this many times wider in azimuth than in elevation
   PointCloudFormat& format = proposal->format;
   if (format.coordinates != PointCoordinates::kCartesian) return false;
   if (makeConfig(configured).radar_overrides.axes) return false;
@@ -308,7 +303,7 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
       proposal->keys.set("radar_axes", axes, "The radar looks along this forward axis.");
       proposal->odd.push_back("the radar looks along " + name(looks) + ", so its axes are " + axes +
                               ", not those of the preset");
-    } else {  // a camera's axes, turned on: forward is z
+    } else {  // forward is z, as for a camera
       proposal->keys.set("radar_axes", "flu", "The radar looks along z.");
       rename(0, 2);
       rename(1, 0);
@@ -318,7 +313,8 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
     resolve(proposal);
     return true;
   }
-  // Forward is right. If the lateral axis is much narrower than the vertical one, those two are swapped.
+  // The forward axis is correct. If the view is much narrower along the lateral axis than along the vertical
+  // one, these two are swapped.
   if (mirrored && cloud.mean_direction.norm() > kLooks && cloud.spread.z() > kWider * cloud.spread.x()) {
     const int lateral = forward == 0 ? 1 : 0;
     rename(lateral, 2);

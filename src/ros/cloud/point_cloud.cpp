@@ -26,10 +26,8 @@ using sensor_msgs::PointField;
 constexpr std::array<std::size_t, 9> kSizes = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 static_assert(PointField::INT8 == 1 && PointField::FLOAT64 == 8);
 
-std::string fieldsOf(const PointCloud2& message) {
-  std::vector<std::string> names;
-  for (const PointField& field : message.fields) names.push_back(field.name);
-  return names.empty() ? "none" : join(names, ", ");
+std::string fieldsText(const PointCloud2& message) {
+  return message.fields.empty() ? "none" : join(fieldNames(message), ", ");
 }
 
 bool hasField(const PointCloud2& message, const std::string& name) {
@@ -40,7 +38,7 @@ bool hasField(const PointCloud2& message, const std::string& name) {
                                const std::string& missing) {
   const std::vector<std::string> fitting = fittingPresets(message);
   std::string text = "point cloud: format '" + format.name + "' needs the field '" + missing +
-                     "'; fields received: " + fieldsOf(message) +
+                     "'; fields received: " + fieldsText(message) +
                      "; presets known: " + join(pointCloudPresets(), ", ");
   const bool is_old_ti = message.fields.size() == 4 && hasField(message, "x") && hasField(message, "y") &&
                          hasField(message, "z") && hasField(message, "intensity");
@@ -63,13 +61,13 @@ bool hasField(const PointCloud2& message, const std::string& name) {
       "point cloud: " + fault + " (width " + std::to_string(message.width) + ", height " +
       std::to_string(message.height) + ", point_step " + std::to_string(message.point_step) + ", row_step " +
       std::to_string(message.row_step) + ", data " + std::to_string(message.data.size()) +
-      " bytes; fields received: " + fieldsOf(message) + ")");
+      " bytes; fields received: " + fieldsText(message) + ")");
 }
 
 constexpr bool kHostIsBigEndian = boost::endian::order::native == boost::endian::order::big;
 
-/// Reads one field of a point, in either byte order. Checked against point_step when it is made, so that
-/// reading needs no checks.
+/// Reads one field of a point, in either byte order. The constructor checks that the field lies within a
+/// point, so read() needs no checks.
 class FieldReader {
  public:
   FieldReader(const PointCloud2& message, const PointCloudFormat& format, const std::string& name) {
@@ -115,7 +113,7 @@ class FieldReader {
   std::uint8_t datatype_ = 0;
 };
 
-/// Where the points lie, in numbers that have been checked against the data.
+/// Where the points lie. The numbers are checked against the size of the data.
 struct Layout {
   std::size_t width = 0, height = 0, point_step = 0, row_step = 0;
 };
@@ -143,7 +141,7 @@ Layout checkedLayout(const PointCloud2& message, const PointCloudFormat& format)
   // Products of two 32-bit numbers fit into 64 bits; those of three need not, so divide instead.
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
   if (row > size) throwLayout(message, "the data is shorter than one row of points");
-  // row_step says nothing where there is one row, and is often left unset there.
+  // With one row, row_step means nothing, and drivers often leave it unset.
   const std::uint64_t step = message.height > 1 ? std::uint64_t{message.row_step} : row;
   if (step < row) throwLayout(message, "row_step is shorter than a row of points");
   if (message.height - 1 > (size - row) / step)
@@ -168,14 +166,14 @@ bool isFinite(const RadarPointPcl& p) {
          std::isfinite(p.snr_db);
 }
 
-/// Whether a driver filled its cloud up with this.
+/// Whether a driver only fills its cloud up with this point.
 bool isPadding(const std::array<double, 3>& p) {
   const auto all = [&p](auto is) { return std::all_of(p.begin(), p.end(), is); };
   return all([](double x) { return x == 0.0; }) || all([](double x) { return std::isnan(x); });
 }
 
 float narrow(double value) {
-  // A conversion that overflows is undefined; NaN makes the point drop out.
+  // A conversion that overflows is undefined; the decoder drops a point with NaN.
   if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
     return std::numeric_limits<float>::quiet_NaN();
   }
@@ -191,12 +189,18 @@ double toDecibel(double power, PowerUnit unit) {
     case PowerUnit::kSnrDeciDb:
       return 0.1 * power;
     case PowerUnit::kSnrLinear:
-      // No power at all is a very weak point, not a broken one.
+      // A power of zero is a very weak point, not a broken one.
       return 10.0 * std::log10(std::max(power, 1e-30));
     case PowerUnit::kNotSnr:
       break;
   }
   return static_cast<double>(kUnknownSnrDb);
+}
+
+std::vector<std::string> fieldNames(const PointCloud2& message) {
+  std::vector<std::string> names;
+  for (const PointField& field : message.fields) names.push_back(field.name);
+  return names;
 }
 
 std::vector<std::string> fittingPresets(const PointCloud2& message) {

@@ -12,10 +12,11 @@ namespace rio_t {
 namespace {
 
 constexpr std::size_t kTriggersKept = 64;  // some seconds of them
-// One scan without its seq is a lost trigger; several in a row, and the two count from different starts.
+// One scan without a trigger of its seq means a lost trigger. So many in a row mean that triggers and scans
+// count from different starts.
 constexpr std::size_t kUnmatchedMeansUnlike = 5;
 constexpr double kClockMapSpan = 60.0;  // [s]
-// No transport delays the IMU by more for so many samples; and if one did, its scans would be as late.
+// No transport delays so many IMU samples by more than this. If one did, it would delay the scans as well.
 constexpr std::int64_t kJump_ns = 500'000'000;
 constexpr int kJumpSamples = 20;
 // A message holds no later stamp: its seconds have 32 bits.
@@ -56,32 +57,33 @@ StampingOptions stampingOptions(const Config& config) {
 
 ScanStamper::ScanStamper(StampingOptions options) : options_(std::move(options)) {}
 
-void ScanStamper::see(Time record) {
+void ScanStamper::advanceTo(Time record) {
   if (!first_record_) first_record_ = now_ = record;
   now_ = std::max(now_, record);
 }
 
 void ScanStamper::followStepBack(Time record) {
   const double step = record - *newest_imu_record_;
-  const auto carryOver = [&](auto& each) {
+  const auto shift = [&](auto& each) {
     if (each.record - record > kMaxDelay) each.record = each.record + step;
   };
-  for (Held& scan : held_) carryOver(scan);
-  for (Trigger& trigger : triggers_) carryOver(trigger);
+  for (Held& scan : held_) shift(scan);
+  for (Trigger& trigger : triggers_) shift(trigger);
   if (first_record_) first_record_ = *first_record_ + step;
   now_ = record;
 }
 
 void ScanStamper::addImu(Time stamp, Time record) {
-  // Samples come in their own order. Scans and triggers may be handed over late, which is no step.
+  // The samples of the IMU keep their order, so an earlier record means that the clock stepped back. Scans
+  // and triggers may be handed over late.
   if (newest_imu_record_ && record - *newest_imu_record_ < -kMaxDelay) followStepBack(record);
   newest_imu_record_ = record;
-  see(record);
+  advanceTo(record);
   clocks_.add(stamp, record);
 }
 
 void ScanStamper::addTrigger(std::uint32_t seq, Time stamp, Time record) {
-  see(record);
+  advanceTo(record);
   if (stamp == Time()) {
     throw std::runtime_error("topic " + options_.trigger_topic +
                              " (trigger_topic): the stamp in the header is zero; stamp_source: trigger needs "
@@ -94,7 +96,7 @@ void ScanStamper::addTrigger(std::uint32_t seq, Time stamp, Time record) {
 }
 
 void ScanStamper::addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan) {
-  see(record);
+  advanceTo(record);
   if (options_.source == StampSource::kHeader && header_stamp == Time()) {
     throw std::runtime_error(
         "topic " + options_.radar_topic +
@@ -151,7 +153,8 @@ ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
 
 ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {
   Trigger* found = nullptr;
-  // A busy machine delivers connections in any order. Once the two count alike, the seq is enough.
+  // A busy machine delivers the topics in any order. Once triggers and scans are known to count alike, the
+  // seq is enough.
   const double overtake = counting_ == Counting::kAlike ? kMaxDelay : kMaxOvertake;
   for (Trigger& trigger : triggers_) {
     const double delay = scan.record - trigger.record;
@@ -175,15 +178,15 @@ ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stam
     return Decision::kStamped;
   }
   if (counting_ != Counting::kUnlike) {
-    // The threads of a busy node may hand over the IMU, the scan and its trigger in another order than they
-    // came. Triggers keep their own order, so a later one says that the scan's will not come.
+    // The threads of a busy node may hand over IMU, scan and trigger in another order than they came.
+    // Triggers keep their order, so a later trigger shows that the one of this scan will not come.
     const bool later_came = !triggers_.empty() && triggers_.back().seq > scan.seq;
     const double patience = later_came ? kMaxOvertake : kMaxDelay;
     if (!finishing_ && now_ - scan.record <= patience) return Decision::kWait;
     if (counting_ == Counting::kAlike && ++unmatched_ < kUnmatchedMeansUnlike) return Decision::kGiveUp;
     if (counting_ == Counting::kUnknown && !finishing_) {
-      // Its trigger may have been sent before the first message: that says nothing about how they count. Then
-      // a later scan tells.
+      // The trigger may have been sent before the first message, so its absence does not show how they count.
+      // A later scan does.
       const bool later_matches = std::any_of(
           held_.begin() + 1, held_.end(), [&](const Held& later) { return triggerOfSeq(later) != nullptr; });
       if (later_matches) return Decision::kGiveUp;

@@ -15,28 +15,33 @@ namespace rio_t {
 
 struct DecodedScan {
   pcl::PointCloud<RadarPointPcl> cloud;  ///< finite points, RIO axes
-  std::size_t padding = 0;               ///< points at range zero or with no position but NaN; not in `cloud`
-  std::size_t dropped_not_finite = 0;    ///< other points with a NaN or an infinity; likewise
+  std::size_t padding = 0;             ///< points at range zero, or whose position is all NaN; not in `cloud`
+  std::size_t dropped_not_finite = 0;  ///< other points with a NaN or an infinity; likewise
 };
 
-/// Decodes a cloud. No size in the message is trusted: throws std::runtime_error, with the fields received,
-/// the presets known and the one that fits, where a field is missing or the layout does not hold the points
-/// it declares. Some drivers fill their clouds up to a fixed size: that padding is no detection.
+/// Decodes a cloud. It trusts no size in the message: throws std::runtime_error if a field is missing, or if
+/// the data do not hold the points that the message declares. The text lists the fields received, the presets
+/// known and those that fit. Points with which a driver fills its cloud up to a fixed size (padding) are no
+/// detections.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
 
-/// Converts a power in that unit to a signal to noise ratio [dB]; kUnknownSnrDb if the unit is of no ratio.
+/// Converts a power to a signal to noise ratio [dB]; kUnknownSnrDb for PowerUnit::kNotSnr.
 double toDecibel(double power, PowerUnit unit);
 
-/// The presets whose fields the cloud has. The field of the power counts even where it is not read: its name
-/// tells drivers apart.
+/// Returns the presets whose fields the cloud has. The power field counts even if a preset does not read it,
+/// since its name tells drivers apart.
 std::vector<std::string> fittingPresets(const sensor_msgs::PointCloud2& message);
 
-/// For the estimator, with the ambiguous points marked. `stamp` is the scan's time in the IMU clock.
+/// The names of the fields of a cloud.
+std::vector<std::string> fieldNames(const sensor_msgs::PointCloud2& message);
+
+/// Converts a cloud to a scan, and marks its ambiguous points. `stamp` is the time of the scan in the IMU
+/// clock.
 RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp);
 
-/// The chosen points (indices into scan.points) as a cloud of fields x y z doppler snr_db, in the axes of
-/// `radar_frame` (x forward, y left, z up), for display. An index past the end throws std::out_of_range. The
-/// header is left to the caller.
+/// Converts the chosen points (indices into scan.points) to a cloud for display, with the fields x y z
+/// doppler snr_db in the axes of `radar_frame` (x forward, y left, z up). The caller sets the header. Throws
+/// std::out_of_range for an index past the end.
 sensor_msgs::PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>& indices);
 
 }  // namespace rio_t

@@ -7,7 +7,8 @@
 
 namespace rio_t {
 
-/// Stands for "not known": above every sensible minimum, so that the SNR filter lets such points through.
+/// The SNR of a point whose SNR is not known. It is above every sensible minimum, so that the filter keeps
+/// the point.
 constexpr float kUnknownSnrDb = 1000.0F;
 
 /// One detection as a PCL point, in metres. Decoded, it has RIO axes: x right, y forward, z up; in `~points`

@@ -15,11 +15,10 @@
 
 namespace rio_t {
 
-/// Carries times of the recording (or receiving) clock over into the IMU clock. A message is recorded after
-/// it was stamped, so the smallest difference seen between the two is the clocks' difference and the shortest
-/// delay of the IMU. The minimum is over the last one to two minutes, so that it follows clocks that drift.
-/// Where the differences stay far above it, or the stamps run back, one of the clocks has jumped, and the
-/// minimum starts again.
+/// Converts times of receipt (or recording) to the IMU clock. A message is received after it was stamped. So
+/// the smallest difference between the two is the difference of the clocks plus the shortest delay of the
+/// IMU. The minimum is over the last one to two minutes, so that it follows clocks that drift. If the
+/// differences stay far above it, one of the clocks has jumped, and the minimum starts again.
 class ClockMap {
  public:
   void add(Time stamp, Time record);
@@ -37,26 +36,27 @@ class ClockMap {
 struct StampingOptions {
   StampSource source = StampSource::kHeader;
   double shift = 0.0;       ///< [s] added to every stamp
-  std::string radar_topic;  ///< for messages to people, as the next
+  std::string radar_topic;  ///< for messages, as is trigger_topic
   std::string trigger_topic;
 };
 StampingOptions stampingOptions(const Config& config);
 
-/// Gives scans their stamps in the IMU clock. Knows no ROS node: the live node and the bag runner feed it
+/// Gives scans their stamps in the IMU clock. It knows no ROS node: the live node and the bag runner feed it
 /// what they receive, in the order of receipt. "record" is the time of receipt or recording; it may run on
 /// another clock than the stamps.
 ///
 /// header: the stamp of the cloud.
-/// arrival: the time of receipt, carried over by ClockMap.
+/// arrival: the time of receipt, which ClockMap converts.
 /// trigger: the stamp of the scan's trigger, found
-///  - by `seq`, where one trigger with the scan's seq was recorded between kMaxDelay before the scan and
-///    kMaxOvertake after it (kMaxDelay after it, once triggers and scans are known to count alike);
-///  - else, once it is clear that the two do not count alike, by time: the trigger nearest to the header's
-///    stamp, within half a trigger period; where that stamp is zero, the latest recorded before the scan.
-///  A scan waits kMaxDelay for its trigger, and kMaxOvertake once a later trigger came.
-///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
-///  One whose trigger never comes is given up and counted; no trigger serves two scans.
-/// A scan is given up, too, if its shifted stamp is below zero or later than a message can hold.
+///  - by `seq`, if one trigger with the scan's seq was recorded between kMaxDelay before the scan and
+///    kMaxOvertake after it (kMaxDelay after it, once it is known that triggers and scans count alike);
+///  - else, once it is clear that they do not count alike, by time: the trigger nearest to the header's
+///    stamp, within half a trigger period; if that stamp is zero, the latest that was recorded before the
+///    scan.
+///  A scan waits kMaxDelay for its trigger, or kMaxOvertake once a later trigger has come.
+///  While a scan waits, the scans after it wait, too, so that the order is kept.
+///  A scan whose trigger never comes is given up and counted. A trigger serves only one scan.
+/// A scan is also given up if its shifted stamp is below zero or later than a message can hold.
 class ScanStamper {
  public:
   static constexpr double kMaxDelay = 0.5;      ///< [s] from a trigger to its scan, both as recorded
@@ -74,7 +74,7 @@ class ScanStamper {
 
   /// Scans that have their stamp now, in the order of receipt.
   std::vector<RadarScan> take();
-  /// At the end of the data: decides what is held with what there is.
+  /// Call it at the end of the data: decides about the scans that still wait.
   std::vector<RadarScan> finish();
 
   /// How many scans were given up since the last call, by reason: "trigger_missing", "imu_missing",
@@ -93,15 +93,15 @@ class ScanStamper {
     RadarScan scan;
   };
   enum class Decision { kStamped, kWait, kGiveUp };
-  enum class Counting { kUnknown, kAlike, kUnlike };  // whether triggers and scans share their seq
+  enum class Counting { kUnknown, kAlike, kUnlike };  // whether triggers and scans have the same seq
 
   Decision stampFront(Time* stamp);
   Decision stampFromTrigger(const Held& scan, Time* stamp);
   Decision stampFromTriggerTime(const Held& scan, Time* stamp);
   Trigger* triggerOfSeq(const Held& scan);
   std::optional<double> triggerPeriod() const;
-  void see(Time record);
-  /// The clock of the records was set back to `record`: carries what waits over to it.
+  void advanceTo(Time record);  // sets now_
+  /// The clock of the records was set back to `record`: shifts the records of what waits by the same step.
   void followStepBack(Time record);
   void giveUp(const std::string& reason);
 
