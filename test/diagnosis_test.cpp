@@ -108,7 +108,7 @@ TEST(Diagnosis, ADopplerFieldOfZerosIsNamedOnceThePlatformMoves) {
               "at more than 0.5 m/s for 100 scans.",
               "Check radar_field_doppler"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
-  radar.points_of_doppler = 1;
+  radar.points_with_doppler = 1;
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 

@@ -115,7 +115,7 @@ TEST(EvidenceCollector, DopplersAndFastMotionAreCounted) {
   result.state.v_W = {0.4, 0.0, -0.4};
   collector.add(result);
   const RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
-  EXPECT_EQ(evidence.radars.front().points_of_doppler, 2U);
+  EXPECT_EQ(evidence.radars.front().points_with_doppler, 2U);
   EXPECT_EQ(evidence.radars.front().scans_fast, 1U);
 }
 

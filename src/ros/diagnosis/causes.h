@@ -12,11 +12,11 @@
 
 namespace rio_t {
 
-// A cause shows if it explains at least this share of the evidence. Good runs stay far below: on one real and
-// two simulated bags the gate rejected at most 0.2 % of the scans and the filter no point.
+// The diagnosis names a cause if it explains at least this share of the evidence. Good runs stay far below:
+// on one real and two simulated bags the gate rejected at most 0.2 % of the scans and the filter no point.
 inline constexpr double kManyScans = 0.3;
 inline constexpr double kManyPoints = 0.6;
-/// Scans before anything is said: two seconds at ten a second.
+/// The diagnosis needs so many scans of a radar: two seconds at ten a second.
 inline constexpr std::uint64_t kEnoughScans = 20;
 /// The remedy for a wrong mounting, sign or axes.
 inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds them.";
@@ -29,7 +29,7 @@ inline double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Points that came, with those that the decoder dropped.
+/// All points that came, including those that the decoder dropped.
 inline std::uint64_t pointsReceived(const RadarSummary& radar) {
   return radar.points + radar.points_not_finite;
 }
@@ -43,7 +43,6 @@ inline std::string outOf(std::uint64_t part, std::uint64_t whole, const std::str
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
 }
 
-/// How to find the mounting, for the end of a remedy.
 inline std::string mountingAdvice(const RadarSummary& radar) {
   const auto points = static_cast<double>(radar.points_per_scan[1]);  // 0: not known
   return 0.0 < points && points < kSparsePoints
@@ -51,8 +50,8 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
              : kCheckBag;
 }
 
-/// How far the mounting is turned from the configured one: as the scans say of a mounting that is held, or as
-/// estimated, about the worst axis.
+/// Rotation of the mounting from the configured one, in sigmas: of a mounting that is held, as the scans show
+/// it; else of the estimate, about the worst axis.
 inline double turnSigmas(const RadarSummary& radar, const Config& config) {
   if (radar.errors.turn) return radar.errors.turn->sigmas(kConfiguredSigma);
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
@@ -62,36 +61,36 @@ inline double turnSigmas(const RadarSummary& radar, const Config& config) {
 /// few degrees off, show it no better.
 inline constexpr double kDopplerScaleSigma = 0.1 / 3.0;
 
-/// How far the scale of the Doppler seems to be off.
+/// Error of the scale of the Doppler, in sigmas.
 inline double scaleSigmas(const RadarSummary& radar) { return radar.errors.scale.sigmas(kDopplerScaleSigma); }
 
 /// An offset that is held may be off by 5 ms at three sigma. At 5 m/s^2 this is 0.025 m/s, about the noise of
 /// a Doppler.
 inline constexpr double kHeldOffsetSigma = 0.005 / 3.0;
 
-/// How far the offset seems to be off; 0 if it is estimated.
+/// Error of an offset that is held, in sigmas; 0 if it is estimated.
 inline double offsetSigmas(const RadarSummary& radar) {
   return radar.errors.offset ? radar.errors.offset->sigmas(kHeldOffsetSigma) : 0.0;
 }
 
-/// A lever arm that is held may be off by a centimetre, as a tape measures.
+/// A lever arm that is held may be off by a centimetre, as a tape measures it.
 inline constexpr double kHeldLeverArmSigma = 0.01;
 
-/// How far the lever arm seems to be off; 0 if it is estimated.
+/// Error of a lever arm that is held, in sigmas; 0 if it is estimated.
 inline double leverArmSigmas(const RadarSummary& radar) {
   return radar.errors.lever_arm ? radar.errors.lever_arm->sigmas(kHeldLeverArmSigma) : 0.0;
 }
 
-/// Everything that speaks of one radar.
+/// Adds the causes that one radar shows.
 void addCausesOfRadar(const RadarSummary& radar, const Config& config, std::vector<Cause>* causes);
 
-/// A fault of the IMU shows if it takes a larger share of the samples.
+/// The diagnosis names a fault of the IMU if more than this share of the samples has it.
 inline constexpr double kManySamples = 0.05;
 
 /// Share of the IMU samples that have faults, at most 1.
 double shareOfImuFaults(const RunEvidence& evidence);
 
-/// Everything that speaks of the samples of the IMU: their faults and their noise.
+/// Adds the causes that the samples of the IMU show: their faults and their noise.
 void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes);
 
 }  // namespace rio_t

@@ -13,19 +13,19 @@ namespace {
 
 // As kManyScans.
 constexpr double kManyWindows = 0.3;
-/// An offset of 0.3 to 0.5 s left 85 % of the windows at the bound, and then looks like a wrong scale of the
+/// A true offset of 0.3 to 0.5 s left 85 % of the windows at the bound, and looked like a wrong scale of the
 /// Doppler. A wrong scale of 0.28 to 3.6 left at most 61 % there.
 constexpr double kMostWindows = 0.75;
 constexpr double kFewScansUsed = 0.5;
 constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
-/// [rad] A heading that is off by this much leads aside by a tenth of the way.
+/// [rad] A heading that is off by this much leads to a position error of a tenth of the way.
 constexpr double kVagueHeading = 0.1;
 /// More steps of the offset, for each radar, are a cause: one restart of a driver counts twice at most.
 constexpr std::uint64_t kMostSteps = 2;
 constexpr std::size_t kMostCauses = 3;
 
-/// Windows that were solved, and those of them that ended with the offset at its bound or did not converge.
+/// Windows that were solved. Some ended with the offset at its bound, some did not converge.
 struct Windows {
   std::uint64_t all = 0, at_bound = 0, not_converged = 0;
 };
@@ -49,7 +49,7 @@ double usedShare(const RunEvidence& evidence) {
   return shareOf(used, after_start);
 }
 
-/// Share of the scans that came before the estimate began, and not because of their stamps.
+/// Share of the scans that came before the estimate began for another reason than their stamps.
 double lateStart(const RunEvidence& evidence) {
   std::uint64_t before_start = 0, all = 0;
   for (const RadarSummary& radar : evidence.radars) {
@@ -66,21 +66,21 @@ double shareOfRun(const RunEvidence& evidence, double seconds) {
 /// Share of the time in which the IMU alone carried the estimate.
 double silentShare(const RunEvidence& evidence) { return shareOfRun(evidence, evidence.silent_seconds); }
 
-/// Share of the time without scans of the radar that gave the least.
+/// Share of the time without used scans, of the radar that was silent the longest.
 double worstSilentShare(const RunEvidence& evidence) {
   double seconds = evidence.silent_seconds;
   for (const RadarSummary& radar : evidence.radars) seconds = std::max(seconds, radar.silent_seconds);
   return shareOfRun(evidence, seconds);
 }
 
-/// How far the estimate has turned the vehicle frame from the configured one [rad about the axes of I]; zero
-/// if there is no estimate.
+/// Rotation of the estimated vehicle frame from the configured one [rad about the axes of I]; zero if there
+/// is no estimate.
 Eigen::Vector3d vehicleTurn(const RunEvidence& evidence, const Config& config) {
   if (!evidence.ground_vehicle || !evidence.ground_vehicle->last) return Eigen::Vector3d::Zero();
   return so3::log(evidence.ground_vehicle->rotation * config.odometry.ground_vehicle.T_IV.q_IR.conjugate());
 }
 
-/// The same about the worst axis.
+/// The same about the worst axis, in sigmas.
 double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
   return vehicleTurn(evidence, config).cwiseAbs().maxCoeff() / config.odometry.ground_vehicle.rotation_sigma;
 }
@@ -88,7 +88,7 @@ double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
-/// It is certain, and it explains whatever else there is.
+/// This cause is certain and explains all others, so its share is 1.
 void addPublishers(const RunEvidence& evidence, std::vector<Cause>* causes) {
   for (const std::string& text : evidence.several_publishers)
     causes->push_back({"several_publishers", text, kSeveralPublishersRemedy, 1.0});
@@ -143,7 +143,8 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
                      explained});
-  // A mounting that is far off drives the offset there: the farthest one explains these windows, too.
+  // A mounting that is far off drives the offset to its bound. So the farthest mounting explains these
+  // windows, too.
   Cause* mounting = nullptr;
   for (Cause& each : *causes) {
     const bool is_farthest = mounting == nullptr || each.share > mounting->share;
@@ -165,7 +166,7 @@ void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vect
 }
 
 void addVehicle(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  // It is certain, and the estimate keeps what the constraint did before.
+  // The cause is certain, and the estimate keeps what the constraint did before: the share is 1.
   if (evidence.ground_vehicle && evidence.ground_vehicle->contradicted_at)
     causes->push_back({"vehicle_contradicted",
                        "The motion contradicted platform: ground_vehicle: the platform moves sideways or "
@@ -204,7 +205,7 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
   }
 }
 
-/// After a start at rest the heading drifts, too, but only as the noise of the gyro says.
+/// The heading also drifts after a start at rest, but only by the noise of the gyro.
 void addHeading(const RunEvidence& evidence, std::vector<Cause>* causes) {
   if (evidence.initialized_from != InitializedFrom::kMotion || evidence.heading_sigma <= kVagueHeading)
     return;
@@ -218,7 +219,7 @@ void addHeading(const RunEvidence& evidence, std::vector<Cause>* causes) {
 
 void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   if (evidence.imu_restarts.empty()) return;
-  // It is certain, and it concerns the whole trajectory: the share is 1.
+  // The cause is certain and concerns the whole trajectory: the share is 1.
   causes->push_back({"imu_clock_restart", describeRestarts(evidence.imu_restarts, config),
                      evidence.imu_restarts.front().stamps_went_on
                          ? "Correct what the driver of the IMU writes there, or run each part by itself "
@@ -228,7 +229,7 @@ void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<
                      1.0});
 }
 
-/// One of several radars that is silent while another works.
+/// Adds each of several radars that is silent while another works.
 void addSilentRadar(const RunEvidence& evidence, std::vector<Cause>* causes) {
   if (silentShare(evidence) > kMostlySilent) return;
   for (const RadarSummary& radar : evidence.radars) {
@@ -242,14 +243,14 @@ void addSilentRadar(const RunEvidence& evidence, std::vector<Cause>* causes) {
   }
 }
 
-/// Scans that came and were rejected have causes of their own.
+/// If scans came and were rejected, they have causes of their own.
 void addSilence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = silentShare(evidence);
   if (share <= kMostlySilent || (usedShare(evidence) < kFewScansUsed && !causes->empty())) return;
   causes->push_back({"radar_silent",
                      "No scan was used from " + fixedText(evidence.silence_begin, 1) + " to " +
                          fixedText(evidence.silence_end, 1) +
-                         " s after the start: the IMU alone carried the " + "estimate for " +
+                         " s after the start: the IMU alone carried the estimate for " +
                          fixedText(evidence.silent_seconds, 1) + " of " + fixedText(evidence.run_seconds, 1) +
                          " s.",
                      "Look for what stops the radar or loses its messages, or run the part with scans "
@@ -261,7 +262,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = shareOf(evidence.scans_diverged, evidence.scans_judged);
   const std::uint64_t divergences = evidence.divergences;
   if (divergences == 0 && evidence.health != Health::kDiverged) return;
-  // Without scans the velocity gets lost, which counts as diverged: then the lack of scans is the cause.
+  // Without scans the velocity gets lost, which counts as diverged. The cause is then the lack of scans.
   const auto contradicts = [](const Cause& cause) { return cause.name == "contradicts_imu"; };
   const bool scans_are_used = usedShare(evidence) >= kFewScansUsed && silentShare(evidence) <= kMostlySilent;
   if (!scans_are_used && !causes->empty() && std::none_of(causes->begin(), causes->end(), contradicts))
@@ -283,7 +284,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                        std::max(0.05, share)});
     return;
   }
-  // Briefly, near a person: the estimate outvoted it, or its sigmas have grown by what it may have lost.
+  // The estimate diverged only briefly, for example near a person, and is good again.
   if (share <= kManyDiverged && evidence.reinitializations == 0 && evidence.health == Health::kOk) return;
   const auto fewest = std::min_element(evidence.radars.begin(), evidence.radars.end(),
                                        [](const RadarSummary& a, const RadarSummary& b) {
@@ -301,7 +302,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                      std::max(0.05, share), true});
 }
 
-/// A mounting that nobody set is the likeliest cause of a contradiction.
+/// If the data contradict each other, a mounting that nobody set is the likeliest cause.
 void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
   double share = -1.0;
   for (const Cause& cause : *causes)
@@ -382,11 +383,11 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addSilentRadar(evidence, &result.causes);
   addDivergence(evidence, &result.causes);
   addMissingMounting(config, &result.causes);
-  // Stable: of causes that explain the same, the one nearer to the sensor comes first.
+  // Stable: if two causes have the same share, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });
   if (result.causes.size() > kMostCauses) {
-    // A run that ends diverged is bad for that reason, so this one stays.
+    // A run that ends diverged is bad for that reason, so its cause stays.
     const auto last = result.causes.begin() + (kMostCauses - 1);
     const auto diverged =
         std::find_if(last, result.causes.end(), [](const Cause& cause) { return cause.name == "diverged"; });

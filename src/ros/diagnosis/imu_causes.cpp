@@ -8,7 +8,7 @@ namespace {
 
 struct ImuFault {
   const char* name;
-  std::uint64_t samples;  ///< that one of them takes
+  std::uint64_t samples;  ///< number that one fault affects
   const char* text;
   const char* remedy;
 };
@@ -33,13 +33,13 @@ constexpr ImuFault kImuFaults[] = {
     {"imu_stuck", 1, "IMU samples have an axis that stays at one reading.",
      "Look at the cable and the driver of the IMU: one of its axes fails."}};
 
-/// Share of the IMU samples that a fault takes.
-double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
+/// Share of the IMU samples that a fault affects.
+double shareAffected(const ImuFault& fault, const RunEvidence& evidence) {
   return std::min(1.0,
                   shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
 }
 
-/// Nearly all the time passes in gaps, and yet there are many samples: their stamps come in bursts.
+/// Whether the stamps come in bursts: nearly all the time passes in gaps, and yet there are many samples.
 bool stampsComeInBursts(const RunEvidence& evidence, const Config& config) {
   constexpr std::uint64_t kEnoughBursts = 10;
   constexpr double kMostOfTheTime = 0.8;
@@ -65,13 +65,13 @@ void addBursts(const RunEvidence& evidence, double share, std::vector<Cause>* ca
 
 double shareOfImuFaults(const RunEvidence& evidence) {
   double share = 0.0;
-  for (const ImuFault& fault : kImuFaults) share += takenBy(fault, evidence);
+  for (const ImuFault& fault : kImuFaults) share += shareAffected(fault, evidence);
   return std::min(1.0, share);
 }
 
 void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   for (const ImuFault& fault : kImuFaults) {
-    const double share = takenBy(fault, evidence);
+    const double share = shareAffected(fault, evidence);
     if (share <= kManySamples) continue;
     if (fault.name == std::string("imu_gap") && stampsComeInBursts(evidence, config)) {
       addBursts(evidence, share, causes);
@@ -81,7 +81,7 @@ void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vect
                        std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
                        fault.remedy, share});
   }
-  // Certain, and each step moves the rest of the trajectory.
+  // The cause is certain, and each step moves the rest of the trajectory: the share is 1.
   if (const std::uint64_t steps = countOf(evidence.input_faults, "imu_clock_back"))
     causes->push_back({"imu_clock_back",
                        "The clock of the IMU stepped back " + timesText(steps) +

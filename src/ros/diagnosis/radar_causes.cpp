@@ -46,10 +46,10 @@ class RadarCauses {
           "Look for what the driver of the radar writes there, and check the " + key_ + "radar_field_ keys.");
   }
 
-  /// Such scans say that the platform stands still, within a step of the Doppler that they do not show. So
-  /// the IMU contradicts them little.
+  /// Scans with Dopplers of zero show a platform at rest. They do not show the step of the Doppler, which may
+  /// hide slow motion. So the IMU contradicts them only a little.
   void addZeroDoppler() {
-    if (radar_.points_of_doppler > 0 || radar_.scans_fast < kEnoughScans) return;
+    if (radar_.points_with_doppler > 0 || radar_.scans_fast < kEnoughScans) return;
     cause("doppler_zero", 1.0,
           "All " + std::to_string(radar_.points) + " points" + of_ +
               " have a Doppler of zero, and the platform moved at more than " +
@@ -58,12 +58,13 @@ class RadarCauses {
           "Check " + key_ + "radar_field_doppler, and whether the driver of the radar fills this field.");
   }
 
-  /// Too large a step takes slow motion for rest, and moving objects for the static world.
+  /// With too large a step, slow motion counts as rest, and moving objects count as static.
   void addStep() {
     const KnownDoppler& used = radar_.knowledge.doppler_step;
     const KnownDoppler& read = radar_.knowledge.read_doppler_step;
     if (used.source != DopplerSource::kGiven || read.source != DopplerSource::kData) return;
-    constexpr double kOther = 1.5;  // a wrong step is at least two of the true ones, and none may be rounded
+    constexpr double kOther =
+        1.5;  // a wrong step is at least twice the true one; a smaller difference may be rounding
     if (read.value == 0.0 || used.value < kOther * read.value) return;
     cause("doppler_step_far", 1.0 - read.value / used.value,
           "The Dopplers" + of_ + " are multiples of " + shortText(read.value, 3) + " m/s, and " + key_ +
@@ -71,7 +72,7 @@ class RadarCauses {
           "Set " + key_ + "radar_doppler_step: 0, and the step is read off the data.");
   }
 
-  /// A reason why scans were rejected, or gave no velocity before the start.
+  /// Adds a reason why scans were rejected, or gave no velocity before the start.
   void scans(const std::string& reason, const std::string& text, const std::string& remedy) {
     const std::uint64_t count =
         countOf(radar_.scans_rejected, reason) + countOf(radar_.velocity_status, reason);
@@ -166,10 +167,10 @@ class RadarCauses {
           "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
   }
 
-  /// Scans whose points give no velocity, before the start and after it.
+  /// Adds scans whose points give no velocity, before the start and after it.
   void addVelocities() {
     const std::uint64_t kept = pointsOf(radar_, PointVerdict::kKept);
-    // The points that the filter took are a cause of their own.
+    // If the filter removed most points, that is a cause of its own.
     if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) addTooFewPoints(kept);
     scans("too_few_inliers", "have no velocity that enough of their points agree on.",
           "Check " + key_ + "radar_field_doppler, " + key_ +
@@ -182,7 +183,7 @@ class RadarCauses {
               "Doppler in m/s?");
   }
 
-  /// The key that sets a limit of the filter, with its value; empty: no key does.
+  /// Returns the key that sets a limit of the filter, with its value; empty if there is none.
   std::string keyOf(PointVerdict verdict) const {
     const EgoVelocityOptions& o = config_.odometry.radar.ego_velocity;
     switch (verdict) {
@@ -201,7 +202,8 @@ class RadarCauses {
     }
   }
 
-  /// Which of the scans were empty, and which key took the points of the others. `kept`: points.
+  /// Says how many scans were empty, and which keys removed the points of the others. `kept`: number of
+  /// points.
   void addTooFewPoints(std::uint64_t kept) {
     const auto& emptied = radar_.scans_emptied;
     const auto most =
@@ -246,7 +248,7 @@ class RadarCauses {
     scans("too_few_points", "have too few points for a velocity: " + why + ".", remedy);
   }
 
-  /// Scans that give a velocity that the IMU contradicts.
+  /// Adds scans whose velocity contradicts the IMU.
   void addContradictions() {
     const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
     const std::uint64_t contradicted = countOf(radar_.scans_rejected, "innovation");
@@ -263,9 +265,9 @@ class RadarCauses {
   void addScale() {
     const double sigmas = scaleSigmas(radar_);
     if (sigmas <= kWrongScale) return;
-    // A large error is not exact: tilt and biases follow it.
+    // A large error is vague, since tilt and biases follow it.
     const double left = 1.0 - radar_.errors.scale.error;
-    constexpr double kLeast = 0.01;  // zero would be a factor without end
+    constexpr double kLeast = 0.01;  // of zero, the factor would be infinite
     cause("doppler_scale", 1.0 - kWrongScale / sigmas,
           "The Doppler" + of_ + " seems to be about " + shortText(1.0 / std::max(left, kLeast), 2) +
               " times the velocity that the IMU feels.",
@@ -292,8 +294,7 @@ class RadarCauses {
     if (sigmas <= kWrongLeverArm) return;
     cause("lever_arm_far", 1.0 - kWrongLeverArm / sigmas,
           "The scans fit better if the lever arm" + of_ + " changes by " +
-              fixedTexts(radar_.errors.lever_arm->error, 3, ", ") +
-              " m along x, y, z of the IMU, with sigmas of " +
+              fixedTexts(radar_.errors.lever_arm->error, 3) + " m along x, y, z of the IMU, with sigmas of " +
               fixedTexts(radar_.errors.lever_arm->sigma(), 3) + ".",
           "Set estimate_extrinsics: pose, or correct " + keyOrTf("extrinsics_translation") +
               ": `rosrun rio_t calibrate` finds it.");
@@ -321,7 +322,7 @@ class RadarCauses {
             "Set estimate_extrinsics: rotation, or correct " + mountingKey() + ".");
       return;
     }
-    // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
+    // With a wrong sign the estimate turns the mounting around, and then nothing contradicts it.
     cause("mounting_far", share,
           "The estimated mounting" + of_ + " is turned from the configured one by " + degrees(radar_.turn) +
               ", with extrinsics_rotation_sigma " +
@@ -331,14 +332,14 @@ class RadarCauses {
           true);
   }
 
-  /// The key, or the tf, that gives the mounting of the radar.
+  /// Returns the key, or the tf, that gives the mounting of the radar.
   std::string keyOrTf(const std::string& key) const {
     return config_.extrinsics_source == ExtrinsicsSource::kTf ? "the tf of the cloud in the IMU" : key_ + key;
   }
   std::string mountingKey() const { return keyOrTf("extrinsics_rotation_xyzw, order x, y, z, w"); }
 
   static std::string degrees(const Eigen::Vector3d& turn) {
-    return fixedTexts(turn / kDegree, 0, ", ") + " degrees about x, y, z of the IMU";
+    return fixedTexts(turn / kDegree, 0) + " degrees about x, y, z of the IMU";
   }
 
   const RadarSummary& radar_;

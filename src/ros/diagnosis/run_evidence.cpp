@@ -40,7 +40,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   for (const RadarPoint& point : result.scan.points) {
     ++radar.points;
     radar.snr_sum_db += point.snr_db;
-    if (point.doppler != 0.0) ++radar.points_of_doppler;
+    if (point.doppler != 0.0) ++radar.points_with_doppler;
     ++of_scan[static_cast<std::size_t>(filter.judge(point))];
   }
   addPoints(of_scan, &radar);
@@ -50,15 +50,15 @@ void EvidenceCollector::add(const ScanResult& result) {
     radar.seconds_ahead_of_imu = std::max(radar.seconds_ahead_of_imu, ahead);
   if (is_before_start) {
     ++radar.scans_before_start;
-    if (ahead > 0.0) ++radar.scans_ahead_at_start;  // it would have waited, if it were not far ahead
+    if (ahead > 0.0) ++radar.scans_ahead_at_start;  // a scan that is only a little ahead would have waited
     if (oldest_imu_ && result.scan.stamp < *oldest_imu_ && ++radar.scans_before_imu == 1)
       radar.seconds_before_imu = *oldest_imu_ - result.scan.stamp;
     ++radar.scans_rejected[result.rejected_because];
     ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;
   }
-  // A radar that filters what stands still has no scan to use at rest, and is not silent. A late scan came
-  // now.
+  // At rest, a radar that drops static points gives no scan to use, but it is not silent. A late scan counts
+  // from now on.
   if (result.used || result.at_rest)
     last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
   ++evidence_.scans_judged;
@@ -123,7 +123,7 @@ RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry,
   if (start) all.initialized_from = start->from;
   if (!all.initialized) all.waiting_for = odometry.waitingFor();
   all.input_faults = odometry.faults();
-  // These two are judgements of the estimate.
+  // These two judge the estimate, not the input.
   all.divergences = countOf(all.input_faults, "diverged");
   all.reinitializations = countOf(all.input_faults, "reinitialized");
   all.input_faults.erase("diverged");
