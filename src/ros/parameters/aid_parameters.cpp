@@ -27,9 +27,9 @@ void listAids(ParameterList& list, Config& c) {
               "The rotation that you give has this standard deviation about each axis.");
   list.number(
       "vehicle_start_slope_sigma", "rad", zeroOr(kLeastSigma, M_PI), vehicle.start_slope_sigma,
-      "The ground slopes by this standard deviation where the vehicle starts at rest. The estimator levels "
-      "the vehicle frame with it. The default is a floor in a building. Raise it outdoors. 0 means that the "
-      "slope is unknown.");
+      "This is the standard deviation of the slope of the ground on which the vehicle starts at rest. The "
+      "estimator levels the vehicle frame with it. The default is a floor in a building. Raise it outdoors. "
+      "0 means that the slope is unknown.");
   list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", sigma(), vehicle.rotation_noise,
               "The rotation may wander by this random walk about each axis, for example if a load or a "
               "bracket moves.");
@@ -63,13 +63,13 @@ void listAids(ParameterList& list, Config& c) {
       "from the estimate. 0 takes every height.");
   list.number(
       "barometer_gate_timeout", "s", above(0), barometer.gate_timeout,
-      "If heights are rejected for this time, the pressure moves, and no height is used until it rests for "
-      "this time. If it rests elsewhere, the bias is estimated again.");
+      "If heights are rejected for this time, the pressure moves, and no height is used until the pressure "
+      "has been steady for this time. If it is then steady at another value, the bias is estimated again.");
   list.number(
       "barometer_gate_slope", "m/s", above(0), barometer.gate_slope,
-      "If the heights slope by more than this against the motion that the radar tells, beyond what noise "
-      "explains, the pressure moves. Raise it if the radar may be wrong by more: a mounting that is wrong by "
-      "2 degrees makes 0.07 m/s at 2 m/s.");
+      "The pressure also moves if the heights slope by more than this against the motion that the radar "
+      "shows, beyond what noise explains. Raise it if the radar may be wrong by more: a mounting that is "
+      "wrong by 2 degrees makes 0.07 m/s at 2 m/s.");
 }
 
 }  // namespace rio_t

@@ -44,9 +44,10 @@ void listGate(ParameterList& list, InnovationGateOptions& gate) {
       "innovation_model_error", "m/s", between(0, kLargestSigma), gate.model_error,
       "The gate adds this to the standard deviation of the prediction, along each axis. It stands for small "
       "errors of the mounting and of the IMU's scale. Raise it for a platform that is faster than 10 m/s.");
-  list.number("innovation_gate_timeout", "s", above(0), gate.timeout,
-              "If no scan was used for this time, the gate takes the next one of which most points agree. A "
-              "wrong prediction then cannot lock the radar out.");
+  list.number(
+      "innovation_gate_timeout", "s", above(0), gate.timeout,
+      "If no scan was used for this time, the gate takes the next scan that has a velocity on which most "
+      "points agree. A wrong prediction then cannot lock the radar out.");
 }
 
 void listPriors(ParameterList& list, SmootherOptions& smoother) {
@@ -77,10 +78,10 @@ void listOffsetSteps(ParameterList& list, OffsetStepDetectorOptions& monitor) {
       "time_offset_step_detection", monitor.enabled,
       "The estimator looks for steps of the offset, as after a restart of the driver. After a step it "
       "estimates the offset again. Set it to false if the offset cannot step.");
-  list.number("time_offset_step_memory", "s", above(1), monitor.memory,
-              "The detector finds steps that came at most this long ago. A longer time finds smaller steps, "
-              "and steps "
-              "in slower motion.");
+  list.number(
+      "time_offset_step_memory", "s", above(1), monitor.memory,
+      "The detector finds steps that came at most this long ago. A longer time finds smaller steps, and "
+      "steps in slower motion.");
   list.number(
       "time_offset_step_significance", "", above(0), monitor.significance,
       "The offset has stepped if the scans ask for a change of this many standard deviations. Raise it if "
@@ -165,9 +166,9 @@ void listStart(ParameterList& list, Config& c) {
               "If the estimated speed is larger than this, a still IMU shows a smooth ride, not rest.");
   list.number(
       "rest_velocity_sigma", "m/s", sigma(), rest.velocity_sigma,
-      "The zero velocity at rest has this standard deviation on each axis, plus what the platform may have "
-      "gained within rest_window, by the acceleration that the IMU shows. Raise it for a hand that holds "
-      "still, or a platform that may creep by some cm/s.");
+      "The zero velocity at rest has this standard deviation on each axis. The estimator adds the velocity "
+      "that the platform may have gained within rest_window, by the acceleration that the IMU shows. Raise "
+      "it for a hand that holds still, or for a platform that may creep by some cm/s.");
 }
 
 void listTimeOffset(ParameterList& list, Config& c) {
@@ -189,8 +190,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
   list.ofRadar(true);
   list.first().number(
       "time_offset_initial", "s", anyNumber(), c.odometry.radar.time_offset_initial,
-      "The estimate of the offset starts here. A positive offset means that the stamps are late. Set "
-      "it to what an earlier run or `calibrate` found; zero works for offsets of up to 0.2 s.");
+      "The estimate of the offset starts here. A positive offset means that the stamps are late. Set it to "
+      "the value that an earlier run or `calibrate` found; zero works for offsets of up to 0.2 s.");
   list.number(
       "time_offset_sigma", "s", sigma(), c.odometry.radar.time_offset_sigma,
       "The estimate of the offset starts with this standard deviation. Lower it after a calibration. Raise "
@@ -232,9 +233,9 @@ void listHealthAndLandmarks(ParameterList& list, Config& c) {
       "radar that contradicts it, as in front of a bus that passes.");
   list.number(
       "divergence_window", "s", above(0, 60), health.window,
-      "The health is judged by the scans of this time. A longer time bears a crowd that fills the view for "
-      "longer, and tells a divergence later: after two thirds of this time if all scans contradict the "
-      "estimate.");
+      "The health is judged by the scans of this time. With a longer time, a crowd may fill the view for "
+      "longer, but a divergence is reported later: after two thirds of this time if all scans contradict "
+      "the estimate.");
   list.number(
       "divergence_max_contradiction", "", inside(0, 1), health.max_contradiction,
       "The estimate diverged if the mean contradiction of the scans in divergence_window is larger than "
@@ -245,7 +246,7 @@ void listHealthAndLandmarks(ParameterList& list, Config& c) {
       "The estimate diverged if the standard deviation of the velocity is larger than this on one axis.");
   list.number(
       "coasting_after", "s", above(0), health.coasting_after,
-      "The health is coasting after this time without a used scan: the IMU alone carries the estimate.");
+      "After this time without a used scan the health is coasting: the IMU alone carries the estimate.");
 
   LandmarkOptions& landmarks = c.odometry.landmarks;
   list.group("Landmarks: static points that come back hold position and heading");

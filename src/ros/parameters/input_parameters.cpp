@@ -79,7 +79,7 @@ void listFrames(ParameterList& list, Config& c) {
   list.frame(
       "radar_frame", c.radar_frame,
       "This is the frame in which the live node shows what the radar sees: x forward, y left, z up. With "
-      "several radars, rio_t appends _NAME to what stands at the top level. No other node may publish a "
+      "several radars, rio_t appends _NAME to the value of the top level. No other node may publish a "
       "transform of this frame, unless publish_radar_tf is false.");
   list.ofRadar(false);
   list.boolean("publish_tf", c.publish_tf,
@@ -189,7 +189,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "This is the lever arm, the position of the radar in the IMU frame, x, y, z. A tape measure is good "
       "enough: 1 cm of error matters only if the platform turns fast. [] means that nobody has measured it. "
       "rio_t then estimates it, whatever estimate_extrinsics says: with none only the lever arm, with "
-      "rotation the whole pose. If one of several radars has none, the lever arms of all are estimated.");
+      "rotation the whole pose. If the lever arm of one of several radars is [], all lever arms are "
+      "estimated.");
   list.first().rotation(
       "extrinsics_rotation_xyzw", c.odometry.radar.T_IR.q_IR,
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
@@ -205,8 +206,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "mounting_yaw_pitch_roll_deg", "deg", between(-360, 360), c.mounting,
       "These angles replace extrinsics_rotation_xyzw: yaw to the left, pitch up, roll right side down. They "
       "assume an IMU with x forward, y left, z up. [0, 0, 0] is an upright radar that looks forward. [] "
-      "means that extrinsics_rotation_xyzw is used. Give only one of the two in a file. --set and the "
-      "parameter server replace either one of a file by either one.");
+      "means that extrinsics_rotation_xyzw is used. Give only one of the two keys in a file. Each of them, "
+      "given by --set or on the parameter server, replaces the rotation of the file.");
 
   SmootherOptions& smoother = c.odometry.smoother;
   list.group("Estimate of T_IR: the mounting above is where the estimate starts");
@@ -217,12 +218,11 @@ void listExtrinsics(ParameterList& list, Config& c) {
        {"pose", EstimateExtrinsics::kPose}},
       c.estimate_extrinsics,
       "none takes the mounting as it is. rotation estimates the rotation of the radar on the way, and takes "
-      "its position as exact. pose estimates its position as well, as far as the platform turns. Use pose "
-      "for a mounting by eye, keep what calibrate wrote after a calibration, and use none only for a "
-      "mounting "
-      "that is exact. A position that is not given is estimated in any "
-      "case. With platform: ground_vehicle, none estimates the rotation, too, but takes it to be right to a "
-      "degree (or to extrinsics_rotation_sigma, if that is smaller).");
+      "its position as exact. pose also estimates its position, as far as the platform turns. Use pose for "
+      "a mounting by eye. After a calibration, keep what calibrate wrote. Use none only for a mounting that "
+      "is exact. A position that is not given is always estimated. With platform: ground_vehicle, none also "
+      "estimates the rotation, but takes it to be right to a degree (or to extrinsics_rotation_sigma, if "
+      "that is smaller).");
   list.number(
       "extrinsics_rotation_sigma", "rad", sigma(M_PI), c.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "

@@ -1,6 +1,6 @@
 #include "parameter_sections.h"
 
-// Loading, checking, the fault messages, config/estimator.yaml and docs/parameters.md all come from here.
+// The registry serves loading, checking, messages, config/estimator.yaml and docs/parameters.md.
 namespace rio_t {
 
 void listPrograms(ParameterList& list, Config& c) {
@@ -32,8 +32,8 @@ void listPrograms(ParameterList& list, Config& c) {
               "The bag runner plays this much of the bag. 0 plays it to its end.");
   list.textOrEmpty(
       "ground_truth", c.ground_truth,
-      "This TUM file holds the true poses of the IMU. The bag runner compares the estimate with them. "
-      "If it is empty, the bag runner reads ground_truth_topic, if the bag has it.");
+      "This TUM file holds the true poses of the IMU. The bag runner compares the estimate with them. If it "
+      "is empty, the bag runner reads ground_truth_topic if the bag has it.");
 }
 
 ParameterList parametersOf(Config& config) {

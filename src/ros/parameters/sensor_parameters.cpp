@@ -55,8 +55,8 @@ void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
   list.number(
       "ego_velocity_prior_gate", "", above(0), radar.prior_gate,
       "A velocity contradicts the prediction of the IMU if the two are more than this many standard "
-      "deviations apart. The estimator then prefers the points that agree with the prediction, e.g. beside a "
-      "bus.");
+      "deviations apart. The estimator then prefers the points that agree with the prediction, for example "
+      "beside a bus that moves.");
   list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
                "Each scan restarts the random generator with this seed, so that the same scan gives the same "
                "velocity. Change it only to see how much the draws matter.");
