@@ -10,7 +10,7 @@
 namespace rio_t {
 namespace {
 
-/// The folder of the configurations that came with this library: PREFIX/lib/librio_t_ros.so and
+/// Returns the folder of the configurations that came with this library: PREFIX/lib/librio_t_ros.so and
 /// PREFIX/share/rio_t/config, in the install space as in the devel space. No workspace needs to be sourced.
 std::string configFolder() {
   static const char in_this_library = 0;
@@ -24,7 +24,7 @@ std::string configFolder() {
 
 std::string findConfigFile(const std::string& name_or_path) {
   namespace fs = std::filesystem;
-  // A folder of that name says nothing: `--config irs` works beside a folder with the results for irs.
+  // A folder of that name does not count: `--config irs` works beside a folder with the results for irs.
   if (name_or_path.find('/') != std::string::npos || fs::is_regular_file(name_or_path)) {
     if (!fs::exists(name_or_path))
       throw std::runtime_error("configuration " + name_or_path + ": no such file");

@@ -6,7 +6,7 @@
 namespace rio_t {
 namespace {
 
-/// What single values of one radar cannot show.
+/// Adds contradictions between the values of one radar.
 void addContradictions(const Config& config, std::vector<std::string>* faults) {
   const std::string section = prefixOf(config.radar_name);
   if (config.odom_frame == config.base_link_frame)
@@ -31,7 +31,7 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
     faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
 }
 
-/// A topic has one type.
+/// Adds topics of which two inputs expect different types.
 void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
   const std::vector<InputTopic> inputs = inputTopics(config);
   for (std::size_t k = 0; k < inputs.size(); ++k)
@@ -41,7 +41,7 @@ void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
                           inputs[k].topic + "\" for both");
 }
 
-/// What one radar cannot show.
+/// Adds contradictions between radars.
 void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::string>* faults) {
   for (std::size_t k = 0; k < radars.size(); ++k) {
     const Config& radar = radars[k];

@@ -44,7 +44,7 @@ std::string unknownKey(const ParameterEntry& entry, const std::string& section, 
          " (config/estimator.yaml lists all)";
 }
 
-/// Sets the parameter of that key; what is wrong goes into `faults`.
+/// Sets the parameter of that key, or adds to `faults`.
 void setParameter(const ParameterEntry& entry, const std::string& section, const ParameterList& list,
                   std::vector<std::string>* faults) {
   const Parameter* parameter = list.find(entry.key);
@@ -75,10 +75,10 @@ bool isRadar(const std::string& name, const std::vector<Config>& radars) {
                      [&](const Config& each) { return each.radar_name == name; });
 }
 
-/// The values of the top level, `radars` with no more than their names; what is wrong goes into `faults`.
+/// Sets the values of the top level; `radars` gets only names.
 void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
                  const std::vector<Config>& radars, std::vector<std::string>* faults) {
-  // First, since it says which other keys there are.
+  // `radars` comes first, since it says which other keys there are.
   for (const ParameterEntry& entry : entries) {
     if (entry.key == "radars") setParameter(entry, "", list, faults);
   }
@@ -106,7 +106,7 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
   }
 }
 
-/// Sets what stands in the section of a radar.
+/// Sets the values in the section of a radar.
 void setSection(const Section& section, Config* radar, std::vector<std::string>* faults) {
   beginMounting(section.entries, prefixOf(radar->radar_name), radar, faults);
   const ParameterList list = parametersOf(*radar);
@@ -126,11 +126,11 @@ bool wasRadar(const std::string& name, const ParameterEntries& top_level) {
   });
 }
 
-/// Refuses a value on the command line, or on the parameter server beside a file, that every radar overrides
+/// Refuses a value of the command line, or of the parameter server beside a file, if every radar overrides it
 /// in its section: it would silently do nothing.
 void refuseHidden(const SortedEntries& sorted, const std::vector<Config>& radars,
                   std::vector<std::string>* faults) {
-  // Both say how the radar is turned, and the later one holds.
+  // Both keys give the rotation of the radar, and the later one counts.
   const auto isTurn = [](const std::string& key) {
     return key == "mounting_yaw_pitch_roll_deg" || key == "extrinsics_rotation_xyzw";
   };
@@ -140,14 +140,14 @@ void refuseHidden(const SortedEntries& sorted, const std::vector<Config>& radars
     const ParameterEntries& own = section->second.entries;
     return std::any_of(own.begin(), own.end(), [&](const ParameterEntry& each) {
       return (each.key == entry.key || (isTurn(each.key) && isTurn(entry.key))) &&
-             (entry.origin == kCommandLine || !isOfServer(each));
+             (entry.origin == kCommandLine || !isFromServer(each));
     });
   };
   for (const ParameterEntry& entry : sorted.top_level) {
     const bool is_hidden =
         !radars.empty() &&
         std::all_of(radars.begin(), radars.end(), [&](const Config& radar) { return hides(radar, entry); });
-    if (!is_hidden || (entry.origin != kCommandLine && !isOfServer(entry))) continue;
+    if (!is_hidden || (entry.origin != kCommandLine && !isFromServer(entry))) continue;
     std::string expected;
     for (const Config& radar : radars) appendItem(&expected, radar.radar_name + "/" + entry.key);
     faults->push_back(entry.origin + ": " + entry.key +
@@ -233,7 +233,7 @@ Config makeConfig(const ParameterEntries& entries) {
     config.odometry.radars.push_back(radar.odometry.radar);
   }
   resolveEstimate(&config);
-  // Judged only where each value is right by itself: otherwise a default might be blamed.
+  // Only if each value is valid by itself: otherwise the fault might name a default.
   if (faults.empty()) faults = contradictions(config);
   if (!faults.empty()) throw ConfigError(std::move(faults));
   return config;
@@ -255,7 +255,7 @@ Config withParameters(const Config& config, const ParameterEntries& entries) {
 }
 
 ParameterValue parameterValue(const Config& config, const std::string& key) {
-  Config copy = config;  // the list wants members that it could set
+  Config copy = config;  // a list needs members that it could set
   const ParameterList list = parametersOf(copy);
   const Parameter* parameter = list.find(key);
   if (parameter == nullptr) throw std::invalid_argument("no parameter \"" + key + "\"");

@@ -28,7 +28,7 @@ bool isGiven(const ParameterEntry* entry) {
 /// The file, the command line, or the parameter server: the origin without line and key.
 std::string sourceOf(const ParameterEntry& entry) {
   const std::string& origin = entry.origin;
-  if (isOfServer(entry)) return kParameterServer;
+  if (isFromServer(entry)) return kParameterServer;
   const std::size_t colon = origin.rfind(':');
   if (colon == std::string::npos) return origin;
   const bool is_line = origin.find_first_not_of("0123456789", colon + 1) == std::string::npos;

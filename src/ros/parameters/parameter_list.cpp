@@ -37,8 +37,8 @@ std::optional<Eigen::Vector3d> asVector3(const ParameterValue& value, const Rang
   return Eigen::Vector3d(x->data());
 }
 
-/// Topics, frames and file names have no use for line breaks and the like, and must not break a line of what
-/// is written for people.
+/// Whether a text has no control characters. Topics, frames and file names need none, and they would break
+/// the lines of messages and files.
 bool isOneLine(const std::string& text) {
   return std::none_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; });
 }
@@ -61,7 +61,7 @@ std::string numberText(double value) {
   std::string text;
   for (int digits = 1; digits <= 17; ++digits) {
     text = shortText(value, digits);
-    // As many digits as it needs, and as stand before the point: 60, not 6e+01.
+    // As many digits as the number needs, and at least those before the point: 60, not 6e+01.
     const bool whole_part_shown = std::abs(value) < std::pow(10.0, digits) || std::abs(value) >= 1e15;
     if (asNumber(parsePlainScalar(text)) == value && whole_part_shown) break;
   }

@@ -46,7 +46,7 @@ class ParameterList {
     group_ = title;
     of_radar_ = false;
   }
-  /// Whether each radar may have its own value of the next parameters.
+  /// Says whether each radar may have its own values of the next parameters.
   void ofRadar(bool of_radar) { of_radar_ = of_radar; }
   /// Makes the next parameter one of those that a new user reads first.
   ParameterList& first() {
@@ -75,7 +75,7 @@ class ParameterList {
   template <typename T>
   void choice(const std::string& key, const std::vector<std::pair<std::string, T>>& choices, T& member,
               const std::string& text);
-  /// The names of radars; sets nothing but their names.
+  /// The names of radars. It sets only their names.
   void radarNames(const std::string& key, std::vector<Config>& member, const std::string& text);
 
   const std::vector<Parameter>& all() const { return all_; }
@@ -84,8 +84,8 @@ class ParameterList {
  private:
   void addText(const std::string& key, std::string& member, const std::string& text, bool may_be_empty,
                bool is_frame = false);
-  /// Adds a parameter that sets `member` to what `read` makes of a value, unless that is nothing. `about` has
-  /// no group, `of_radar` and `first` yet.
+  /// Adds a parameter. `read` converts a value for `member`, or returns nothing for a wrong one. `about`
+  /// needs no group, `of_radar` and `first`.
   template <typename T, typename Read, typename Show>
   void bind(ParameterDescription about, T& member, const Read& read, const Show& show) {
     about.group = group_;
@@ -98,7 +98,7 @@ class ParameterList {
     };
     all_.push_back({std::move(about), set, [&member, show] { return show(member); }});
   }
-  /// The same of a member that a ParameterValue can hold.
+  /// The same for a member that a ParameterValue can hold.
   template <typename T, typename Read>
   void bind(ParameterDescription about, T& member, const Read& read) {
     bind(std::move(about), member, read, [](const T& value) { return ParameterValue{value}; });
@@ -156,22 +156,23 @@ void ParameterList::choice(const std::string& key, const std::vector<std::pair<s
 ParameterList parametersOf(Config& config);
 
 struct Section {
-  std::string origin;  ///< of what stands first in it
+  std::string origin;  ///< of its first entry
   ParameterEntries entries;
 };
 
-constexpr const char* kEffective = "effective";  ///< where the node writes what it runs with
-/// Whether the node's namespace has this key, but the registry has not. No radar may have such a name.
+constexpr const char* kEffective = "effective";  ///< the node writes the parameters of the run under this key
+/// Whether this key of the node's namespace is no parameter of the registry. No radar may have such a name.
 bool isReserved(const std::string& key);
 
-/// Entries of the top level, and those of each section: nested keys, or `name/key`.
+/// The entries of the top level, and those of each section: nested keys, or `name/key`.
 struct SortedEntries {
   ParameterEntries top_level;
   std::map<std::string, Section> sections;  ///< by name
 };
 SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList& list);
 
-/// The radar's configuration before its section is read: two radars share all but the frame.
+/// The configuration of a radar before its section is read: that of the top level, with a radar_frame of its
+/// own.
 Config withoutSection(const Config& top_level, const std::string& name);
 
 /// Returns one line for each contradiction between values that are valid one by one.

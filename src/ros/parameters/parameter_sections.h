@@ -13,8 +13,8 @@ inline Range inside(double min, double max) { return {min, max, true, true}; }
 inline Range below(double min, double max) { return {min, max, false, true}; }  ///< min itself counts
 inline Range zeroOr(double min, double max) { return {min, max, false, false, true}; }
 
-/// The ends of a standard deviation, in SI units. The rows of a system of doubles are divided by them. A
-/// double has 15 digits: that these ends are 12 digits apart leaves three to the numbers themselves. Squares
+/// Bounds of a standard deviation, in SI units. The solver divides rows by standard deviations. Doubles have
+/// 15 digits, and these bounds are 12 digits apart, so three digits remain for the values themselves. Squares
 /// stay finite.
 constexpr double kLeastSigma = 1e-9;
 constexpr double kLargestSigma = 1e3;

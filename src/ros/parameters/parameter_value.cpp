@@ -41,13 +41,13 @@ ParameterValue fromYaml(const YAML::Node& node) {
   if (node.IsMap()) return {ParameterValue::Map{}};  // no deeper than a section
   ParameterValue::List list;
   for (const auto& element : node) {
-    // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
+    // No deeper: no parameter takes lists of lists, and with anchors a list may contain itself.
     list.push_back(element.IsSequence() ? ParameterValue{ParameterValue::Map{}} : fromYaml(element));
   }
   return {std::move(list)};
 }
 
-/// Throws where a document begins at the place of the one before: yaml-cpp reads a comma there for ever.
+/// Throws if a document begins where the one before began: yaml-cpp would read a stray comma for ever.
 class Progress : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark& mark) override {
@@ -69,7 +69,7 @@ class Progress : public YAML::EventHandler {
   int begin_ = -1;
 };
 
-/// What YAML says only as "illegal map value": empty if that line, counted from 0, has no tab.
+/// Returns a hint for what yaml-cpp only calls "illegal map value": a tab in that line, counted from 0.
 std::string hintOfTab(const std::string& yaml, int line) {
   std::istringstream lines(yaml);
   std::string text;
@@ -78,10 +78,10 @@ std::string hintOfTab(const std::string& yaml, int line) {
   return text.find('\t') == std::string::npos ? "" : "; a tab cannot indent: use spaces";
 }
 
-/// Where a line of the YAML text stands, for messages.
+/// Returns the origin of a line of the YAML text, for messages.
 using OriginOfLine = std::function<std::string(int line)>;
 
-/// The entries of a map, and of the maps in it if `sections`.
+/// Returns the entries of a map, and of the maps in it if `sections`.
 ParameterEntries fromYamlMap(const YAML::Node& map, bool sections, const OriginOfLine& originOf) {
   ParameterEntries entries;
   std::map<std::string, int> line_of;
@@ -226,7 +226,7 @@ ParameterEntries readParameters(const std::string& yaml, const std::string& name
   return fromYamlMap(root, true, [&](int line) { return name + ":" + std::to_string(line); });
 }
 
-bool isOfServer(const ParameterEntry& entry) { return entry.origin.rfind(kParameterServer, 0) == 0; }
+bool isFromServer(const ParameterEntry& entry) { return entry.origin.rfind(kParameterServer, 0) == 0; }
 
 ParameterEntry parseAssignment(const std::string& text) {
   const std::size_t equals = text.find('=');

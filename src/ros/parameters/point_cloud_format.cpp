@@ -34,7 +34,7 @@ PointCloudFormat eth() {
   return f;
 }
 
-/// The presets with the fields of each source; see docs and the sources' own message definitions.
+/// The presets, with the fields of each driver or data set.
 const std::vector<PointCloudFormat>& presets() {
   static const std::vector<PointCloudFormat> all = {
       PointCloudFormat(),

@@ -1,4 +1,4 @@
-// The texts about the parameters. The registry has all of them.
+// Prints the parameters, with the texts of the registry.
 #include "../text.h"
 #include "parameter_list.h"
 
@@ -62,7 +62,7 @@ std::string toYaml(const Config& config) {
       "hand.\n"
       "# A configuration of your own names only what differs. Unknown keys are refused.\n"
       "# Angles are in radians, all else is in SI units, unless the name of the key says otherwise.\n";
-  Config copy = config;  // the list wants members that it could set
+  Config copy = config;  // a list needs members that it could set
   visit(
       parametersOf(copy), [&](const std::string& title) { yaml += "\n# --- " + title + "\n"; },
       [&](const Parameter& parameter) {

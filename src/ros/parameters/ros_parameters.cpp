@@ -31,7 +31,7 @@ struct ToXmlRpc {
   XmlRpc::XmlRpcValue operator()(const ParameterValue::Map& entries) const { return toXmlRpc(entries); }
 };
 
-/// The value of that key. `rosrun rio_t rio_t_node _key:=[0,0,180]` makes a text of the list.
+/// Returns the value of a key. `rosrun rio_t rio_t_node _key:=[0,0,180]` makes a text of the list.
 ParameterValue toValueOf(const std::string& key, XmlRpc::XmlRpcValue& value) {
   ParameterValue result = toParameterValue(value);
   const auto* text = std::get_if<std::string>(&result.data);
@@ -40,7 +40,7 @@ ParameterValue toValueOf(const std::string& key, XmlRpc::XmlRpcValue& value) {
     const bool takes_list = std::holds_alternative<ParameterValue::List>(parameterValue(Config(), key).data);
     return takes_list ? parseAssignment(key + "=" + *text).value : result;
   } catch (const std::invalid_argument&) {
-    return result;  // no such key, or not YAML: its fault shows the text
+    return result;  // no such key, or not YAML: makeConfig reports it
   }
 }
 
@@ -58,7 +58,7 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
       return {static_cast<std::string&>(value)};
     case XmlRpc::XmlRpcValue::TypeArray: {
       ParameterValue::List list;
-      // begin() and end() are those of a struct's members.
+      // begin() and end() run over the members of a struct.
       for (int k = 0; k < value.size(); ++k) {  // NOLINT(modernize-loop-convert)
         // No deeper: no parameter takes lists of lists.
         const bool is_list = value[k].getType() == XmlRpc::XmlRpcValue::TypeArray;
@@ -74,7 +74,8 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
 }
 
 XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {
-  // A struct also without entries: a value of no type makes the whole map one that no server takes.
+  // Starts from an empty struct: without entries the map would have no type, and no server takes a value
+  // without a type.
   int offset = 0;
   XmlRpc::XmlRpcValue map("<value><struct></struct></value>", &offset);
   for (const ParameterEntry& entry : entries) map[entry.key] = std::visit(ToXmlRpc(), entry.value.data);

@@ -14,35 +14,33 @@
 
 namespace rio_t {
 
-/// The source of the stamp of a scan (see stamping.h).
+/// Where the stamp of a scan comes from (see stamping.h).
 enum class StampSource {
   kHeader,   ///< "header": the cloud's own header
   kTrigger,  ///< "trigger": the trigger message that belongs to the scan
-  kArrival,  ///< "arrival": when the scan arrived, carried over into the IMU clock
+  kArrival,  ///< "arrival": the time of arrival, converted to the IMU clock
 };
 std::string toString(StampSource source);
 
-/// How the bag runner goes through a bag.
 enum class RunMode {
-  kOnline,  ///< "online": as a live user has it
-  kBatch,   ///< "batch": the whole bag solved at once, after an online pass
-  kRefine,  ///< "refine": online passes, each with the offset found before taken off the stamps
+  kOnline,  ///< "online": one pass, as live
+  kBatch,   ///< "batch": an online pass, then the whole bag solved at once
+  kRefine,  ///< "refine": several online passes, each with the offset found so far subtracted from the stamps
 };
 
-/// Where T_IR comes from.
 enum class ExtrinsicsSource {
   kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
   kTf,          ///< "tf": the transform from the cloud's frame_id to the frame of the IMU
 };
 
-/// The live node takes T_BI, the pose of the IMU in base_link, from here.
+/// Where the live node takes T_BI from, the pose of the IMU in base_link.
 enum class BaseExtrinsicsSource {
   kAuto,        ///< "auto": tf, if it knows both frames when the odometry starts; else the parameters
   kParameters,  ///< "parameters": base_extrinsics_translation and base_extrinsics_rotation_xyzw
-  kTf,          ///< "tf": the transform from the frame of the IMU to base_link_frame, which is waited for
+  kTf,          ///< "tf": the node waits for the transform from the frame of the IMU to base_link_frame
 };
 
-/// After a reset, the odometry of the live node goes on here.
+/// Where the odometry of the live node goes on after a reset.
 enum class ResetPose {
   kKeep,  ///< "keep": at the last pose
   kZero,  ///< "zero": at the origin
@@ -50,12 +48,12 @@ enum class ResetPose {
 
 /// The axes of the radar that extrinsics_rotation_xyzw turns into those of the IMU.
 enum class ExtrinsicsAxes {
-  kRightForwardUp,  ///< "rfu": x right, y forward, z up, whatever the axes of the cloud
-  kCloud,           ///< "cloud": the cloud's own, see `radar_axes`
+  kRightForwardUp,  ///< "rfu": x right, y forward, z up, even if the cloud has other axes
+  kCloud,           ///< "cloud": the axes of the cloud, see `radar_axes`
 };
 
-/// These members override the preset `radar_format`. Empty text, no value and a sign of zero override
-/// nothing.
+/// These members override the preset `radar_format`. An empty text, no value and a sign of zero keep the
+/// preset.
 struct PointCloudOverrides {
   std::optional<PointCoordinates> coordinates;
   std::optional<PointAxes> axes;
@@ -67,12 +65,13 @@ struct PointCloudOverrides {
   std::optional<bool> size_from_data;
 };
 
-/// All that a user can set: the estimator's options and what surrounds them. Each member has one key, listed
-/// with unit, range and meaning in config/estimator.yaml.
+/// All parameters: the options of the estimator and those of the programs around it. Each member has one key,
+/// listed with unit, range and meaning in config/estimator.yaml.
 struct Config {
-  /// Several radars: the whole configuration as each of them has it. Empty: one radar, and this is its own.
+  /// With several radars, the whole configuration of each. Empty: there is one radar, and this is its
+  /// configuration.
   std::vector<Config> radars;
-  std::string radar_name;  ///< empty, but for an element of `radars`
+  std::string radar_name;  ///< set only in an element of `radars`
 
   std::string imu_topic = "sensor_platform/imu";
   std::string radar_topic = "sensor_platform/radar/scan";
@@ -87,7 +86,7 @@ struct Config {
   std::string base_link_frame = "base_link";
   std::string imu_frame;  ///< empty: the frame_id of the IMU's messages
   BaseExtrinsicsSource base_extrinsics_source = BaseExtrinsicsSource::kAuto;
-  ImuInBody T_BI;  ///< of the parameters
+  ImuInBody T_BI;  ///< by the parameters
   std::string radar_frame = "rio_t_radar";
   bool publish_tf = true;
   bool publish_radar_tf = true;
@@ -101,8 +100,8 @@ struct Config {
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
   // makeConfig turns these four into odometry.radar and odometry.smoother.
-  std::optional<Eigen::Vector3d> lever_arm;  ///< [m] in I; nothing: nobody has measured it
-  double lever_arm_sigma = 0.0;              ///< [m] per axis; 0: by whether `lever_arm` is given
+  std::optional<Eigen::Vector3d> lever_arm;  ///< [m] in I; empty: nobody has measured it
+  double lever_arm_sigma = 0.0;              ///< [m] per axis; 0: the default, which depends on `lever_arm`
   EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
   double extrinsics_rotation_sigma = SmootherOptions().extrinsics_rotation_sigma;  ///< [rad] per axis
   // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.radar.T_IR, which always
@@ -127,22 +126,22 @@ struct Config {
   std::string ground_truth;   ///< TUM file; empty: the topic
 };
 
-/// The configuration as each radar has it: `config.radars`, or `config` alone for one radar. The index is
+/// The configuration of each radar: `config.radars`, or `config` alone if there is one radar. The index is
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
 /// Whether the configuration or tf gives the lever arm of this radar.
 bool hasLeverArm(const Config& radar);
 
-/// [rad] A protractor measures a mounting so well.
+/// [rad] Standard deviation of a mounting that was measured with a protractor.
 constexpr double kConfiguredSigma = 1.0 * kDegree;
 
-/// Whether a mounting that is to be held is estimated all the same, with a prior of kConfiguredSigma: on a
-/// vehicle, an error of a mounting that is exact would tilt the frame of the vehicle.
+/// Whether the mounting is estimated although the user wants to hold it. This is so on a ground vehicle: an
+/// error of a mounting that is held would tilt the vehicle frame. The prior is kConfiguredSigma.
 bool refinesHeldMounting(const Config& config);
 
 using TopicResolver = std::function<std::string(const std::string& key, const std::string& topic)>;
-/// The configuration with each topic as `resolve` gives it. An empty one stays empty.
+/// Returns the configuration with the topics that `resolve` gives. An empty topic stays empty.
 Config withTopics(Config config, const TopicResolver& resolve);
 
 /// A topic that the estimator reads: its key, and the type that it must have.
@@ -154,7 +153,6 @@ std::vector<InputTopic> inputTopics(const Config& config);
 /// The name of a frame for tf2, which refuses the leading slash that tf1 had.
 std::string withoutSlash(const std::string& frame);
 
-/// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
 
 }  // namespace rio_t

@@ -10,17 +10,17 @@ namespace rio_t {
 
 struct ParameterEntry;
 
-/// The value of a parameter wherever it came from: a YAML file, the command line, the ROS parameter server.
+/// The value of a parameter, from a YAML file, the command line or the ROS parameter server.
 struct ParameterValue {
   using List = std::vector<ParameterValue>;
-  /// Nested keys: the section of a radar. It stands, empty, for what lies deeper and for a list in a list:
-  /// no parameter takes any, but the fault must be nameable.
+  /// Nested keys, which are the section of a radar. An empty map stands for deeper levels and for a list in a
+  /// list: no parameter takes these, but messages must be able to name them.
   using Map = std::vector<ParameterEntry>;
   std::variant<std::monostate, bool, std::int64_t, double, std::string, List, Map> data;
 
   /// For messages: `0.25`, `"text"`, `[1, 2]`, `nothing`.
   std::string describe() const;
-  /// As it stands in a parameter file: it reads back as the same value.
+  /// As in a parameter file: it reads back as the same value.
   std::string yaml() const;
 };
 
@@ -38,14 +38,14 @@ struct ParameterEntry {
 using ParameterEntries = std::vector<ParameterEntry>;
 /// Origin of an entry from parseAssignment.
 inline const std::string kCommandLine = "--set";
-/// With these words begins the origin of one from the parameter server.
+/// The origin of an entry from the parameter server begins with this.
 inline const std::string kParameterServer = "parameter ";
-bool isOfServer(const ParameterEntry& entry);
+bool isFromServer(const ParameterEntry& entry);
 
-/// Reads a YAML file, flat but for the sections of radars; throws std::runtime_error with one line naming
-/// file, line and what was expected.
+/// Reads a YAML file, which is flat except for the sections of radars. Throws std::runtime_error with one
+/// line that names file, line and what was expected.
 ParameterEntries readParameterFile(const std::string& path);
-/// The same of a text; `name` stands for the file in messages.
+/// Reads the text of a file; `name` stands for its path in messages.
 ParameterEntries readParameters(const std::string& yaml, const std::string& name);
 
 /// Reads `key=value` with the value as YAML (`--set`); throws std::invalid_argument.

@@ -10,7 +10,7 @@
 
 namespace rio_t {
 
-/// All that is wrong in a configuration at once.
+/// All faults of a configuration at once.
 class ConfigError : public std::runtime_error {
  public:
   explicit ConfigError(std::vector<std::string> faults);
@@ -20,34 +20,34 @@ class ConfigError : public std::runtime_error {
   std::vector<std::string> faults_;
 };
 
-/// Defaults with the entries on top. If a key comes twice, the later holds. If two sources give the mounting,
-/// one as a quaternion and one in words, the later source holds, too. A radar of `radars` has what
-/// its section (nested keys, or `name/key`) sets, and what the top level sets for the rest. Throws
-/// ConfigError naming every unknown key, wrong type, value out of range and contradiction, each with its
-/// origin and what was expected.
+/// Makes a configuration of the defaults and the entries. If a key comes twice, the later entry counts. A
+/// mounting in a later source also replaces one in an earlier source if one is a quaternion and the other has
+/// angles. A radar takes its values from its section (nested keys, or `name/key`), and all others from the
+/// top level. Throws ConfigError that names every unknown key, wrong type, value out of range and
+/// contradiction, each with its origin and what was expected.
 Config makeConfig(const ParameterEntries& entries);
 
-/// A sentence for each radar whose mounting no source gives: the run starts, but it is probably not meant.
+/// Returns a sentence for each radar whose mounting no source gives: the run starts, but the user has
+/// probably forgotten the mounting.
 std::vector<std::string> mountingWarnings(const Config& config);
 
-/// `config` with other values for keys that hold for all radars. Throws ConfigError, as makeConfig, and then
-/// nothing has changed.
+/// Returns `config` with other values for keys that hold for all radars. Throws ConfigError as makeConfig
+/// does.
 Config withParameters(const Config& config, const ParameterEntries& entries);
 /// The value of a key. Throws std::invalid_argument for a key that does not exist.
 ParameterValue parameterValue(const Config& config, const std::string& key);
 
-/// The keys that may change while the live node runs: noises, gates and what is published how often. All hold
-/// for all radars, and each has one truth value, whole number or number.
+/// The keys that may change while the live node runs: noises, gates and publishing rates. Each holds for all
+/// radars and is a truth value, a whole number or a number.
 const std::vector<std::string>& liveKeys();
 
-/// What is known of a key.
 struct ParameterDescription {
   std::string key;
   std::string type;         ///< "number", "integer", "boolean", "choice", "text" or "list"
   std::string unit;         ///< empty: none
   std::string expected;     ///< e.g. "a finite number above 0 and at most 10"
   std::string description;  ///< full sentences: what it is, typical values, when to change it
-  double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
+  double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each number of a list
   double max = std::numeric_limits<double>::infinity();   ///< likewise
   std::string group = {};                                 ///< title of its section
   bool of_radar = false;  ///< each radar may have its own value, in its section

@@ -6,7 +6,6 @@
 
 namespace rio_t {
 
-/// Axes of the positions in a cloud.
 enum class PointAxes {
   kRightForwardUp,  ///< "rfu": x right, y forward, z up, as RIO and this package
   kForwardLeftUp,   ///< "flu": x forward, y left, z up, as REP-103 and most drivers
@@ -20,7 +19,6 @@ enum class PointCoordinates {
   kSpherical,
 };
 
-/// What the power field says.
 enum class PowerUnit {
   kSnrDb,      ///< "snr_db": signal to noise [dB]
   kSnrDeciDb,  ///< "snr_decidb": signal to noise in steps of 0.1 dB, as TI's side info
@@ -30,7 +28,7 @@ enum class PowerUnit {
 
 std::string toString(PowerUnit unit);
 
-/// Turns vectors with x right, y forward, z up into the axes of the cloud.
+/// The rotation that turns vectors with x right, y forward, z up into the axes of the cloud.
 Eigen::Quaterniond cloudFromRfu(PointAxes axes);
 
 /// How a driver lays out its cloud. The defaults are the preset "irs".
