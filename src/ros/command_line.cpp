@@ -26,7 +26,7 @@ namespace po = boost::program_options;
 
 constexpr unsigned kLineLength = 110;
 
-/// `set`, with the name of the option in what it throws.
+/// Returns `set` with the name of the option in what it throws.
 OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
   return [name, set](const std::string& value) {
     try {
@@ -40,7 +40,7 @@ OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
   };
 }
 
-/// `--outputdir`, `--output_dir`, `--out`: what is compared of a name that is not known.
+/// Returns a name for comparison: `--outputdir`, `--output_dir` and `--out` may all mean --output-dir.
 std::string withoutDashes(std::string name) {
   const auto is_dash = [](char c) { return c == '-' || c == '_'; };
   name.erase(std::remove_if(name.begin(), name.end(), is_dash), name.end());
@@ -213,7 +213,7 @@ void OptionSet::values(const std::string& name, const std::string& argument, con
 }
 
 OptionSet::Given OptionSet::parse(const std::vector<std::string>& words) const {
-  std::vector<std::string> own;  // without what roslaunch adds
+  std::vector<std::string> own;  // without the remappings that roslaunch adds
   std::remove_copy_if(words.begin(), words.end(), std::back_inserter(own), isRemapping);
   // No guessing: `--out` must not become `--output-dir`.
   const int style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
@@ -253,7 +253,7 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
   options.flag("help,h", "prints this text", help);
   options.flag("version", "prints the version", version);
   try {
-    // Before anything else is read, so that it helps with a wrong command line, too.
+    // Before anything else is read, so that --help also works with a wrong command line.
     for (const std::string& word : words) help = help || word == "--help" || word == "-h";
     version = words == std::vector<std::string>{"--version"};
     int status = kExitOk;

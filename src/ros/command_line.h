@@ -11,11 +11,10 @@
 
 #include "rio_t/ros/parameters/parameter_value.h"
 
-/// The part that the command lines of all programs share: boost::program_options with checked numbers, one
-/// form of --help, and one meaning of the exit status.
+/// What the command lines of all programs share: boost::program_options with checked numbers, one form of
+/// --help, and one meaning of the exit status.
 namespace rio_t {
 
-/// Exit status of every program.
 enum ExitStatus {
   kExitOk = 0,
   kExitFailed = 1,      ///< data, a file or a parameter was wrong: there is no result
@@ -23,7 +22,6 @@ enum ExitStatus {
   kExitNotTrusted = 3,  ///< there is a result, and it is not to be trusted
 };
 
-/// The command line is wrong.
 class UsageError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
@@ -36,8 +34,8 @@ double parseNumber(const std::string& text, NumberRange range = NumberRange::kAn
 /// Numbers with commas between them: "0.1,0,-2".
 std::vector<double> parseNumbers(const std::string& text, std::size_t count);
 
-/// Options of a program, in sections. Each names the variable that it sets; the variable must outlive the
-/// set. A name has no dashes. The argument is what --help shows for the value, such as M/S or FILE.
+/// Options of a program, in sections. Each option sets a variable, which must outlive the set. A name has no
+/// dashes. The argument is what --help shows for the value, such as M/S or FILE.
 class OptionSet {
  public:
   using Given = boost::program_options::parsed_options;
@@ -93,7 +91,7 @@ struct ProgramText {
 /// exception of `body` becomes one line on `err` and the exit status.
 int runProgram(const ProgramText& text, OptionSet& options, const std::vector<std::string>& words,
                std::ostream& out, std::ostream& err, const std::function<int()>& body);
-/// The same, with something between parsing and setting: `body` gets what was given.
+/// The same, but `body` gets what was given and sets the options itself.
 int runProgramWith(const ProgramText& text, OptionSet& options, const std::vector<std::string>& words,
                    std::ostream& out, std::ostream& err,
                    const std::function<int(const OptionSet::Given&)>& body);
@@ -104,20 +102,20 @@ void addBag(const std::string& bag, std::vector<std::string>& bags);
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set);
 
-/// Throws UsageError that names all options which are needed and not given.
+/// Throws UsageError that names all options that are needed and not given.
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 
-/// Whether both name one file, also if it does not exist yet: a program must not write what it reads, nor two
-/// results to one file.
+/// Whether both name one file, even one that does not exist yet. A program must not write what it reads, nor
+/// two results to one file.
 bool isSameFile(const std::string& a, const std::string& b);
 
-/// Why a program that reads `inputs` cannot write `path`; empty if it can. Programs ask before the work, so
-/// that a wrong path costs no time.
+/// Says why a program that reads `inputs` cannot write `path`; empty if it can. Programs ask before the work,
+/// so that a wrong path costs no time.
 std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs);
 
-/// Writes the file beside `path` first, so that a program that fails leaves what was there. Writes to a link
-/// or a device as it is. A file with another content may be the work of the user, and is kept as PATH~;
-/// returns the name of that copy, or nothing. Throws std::runtime_error that names the path.
+/// Writes the file beside `path` and renames it, so that a failure leaves what was there. A link or a device
+/// is written in place. A file with another content may be the work of the user, and is kept as PATH~.
+/// Returns the name of that copy, or nothing. Throws std::runtime_error that names the path.
 std::string writeFile(const std::string& path, const std::string& text);
 
 /// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is

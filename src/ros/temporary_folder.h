@@ -7,7 +7,7 @@
 
 namespace rio_t {
 
-/// A folder that no other process has, gone at the end.
+/// A folder of this process alone. The destructor removes it.
 class TemporaryFolder {
  public:
   TemporaryFolder() : path_((std::filesystem::temp_directory_path() / "rio_t_XXXXXX").string()) {

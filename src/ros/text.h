@@ -17,12 +17,13 @@ std::string shortText(double value, int digits);
 /// Appends an item to a list in a text: "a, b".
 void appendItem(std::string* list, const std::string& item, const std::string& separator = ", ");
 
-/// Broken into lines of `width`; all but the first begin with `indent`, and the first has room for it.
+/// Breaks a text into lines of `width`. All but the first begin with `indent`, and the first leaves room for
+/// it.
 std::string wrapped(const std::string& text, const std::string& indent, std::size_t width);
 
-/// The keys of a radar begin with this: "left/"; empty if there is one radar.
+/// Prefix of a radar's keys: "left/"; empty if there is one radar.
 std::string prefixOf(const std::string& radar);
-/// The names of its files end with this: "_left"; likewise.
+/// Suffix of its files and of its keys in summary.yaml: "_left"; likewise.
 std::string suffixOf(const std::string& radar);
 
 }  // namespace rio_t

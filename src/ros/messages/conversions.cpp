@@ -15,7 +15,7 @@ namespace {
 
 template <typename Array>
 void assign(const Covariance6& from, Array* to) {
-  // Symmetric in theory; in the message also to the last bit.
+  // A covariance is symmetric up to rounding; the message is symmetric to the last bit.
   Eigen::Map<Covariance6>(to->data()) = 0.5 * (from + from.transpose());
 }
 

@@ -32,7 +32,6 @@ double toDecibel(double power, PowerUnit unit);
 /// since its name tells drivers apart.
 std::vector<std::string> fittingPresets(const sensor_msgs::PointCloud2& message);
 
-/// The names of the fields of a cloud.
 std::vector<std::string> fieldNames(const sensor_msgs::PointCloud2& message);
 
 /// Converts a cloud to a scan, and marks its ambiguous points. `stamp` is the time of the scan in the IMU

@@ -7,7 +7,7 @@
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/ros/parameters/config.h"
 
-/// Mountings of the sensors from tf; live node and bag runner ask the same questions (docs/frames.md).
+/// Looks up the mountings of the sensors in tf, for the live node and the bag runner (docs/frames.md).
 namespace rio_t {
 
 /// The frame of the IMU: the parameter `imu_frame`, else the frame_id of the IMU's messages, else

@@ -25,7 +25,8 @@
 
 namespace rio_t {
 
-/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR), sightings. Without header.
+/// Converts the landmarks to a cloud in the odometry frame: x, y, z, sigma [m], intensity (mean SNR),
+/// sightings. Without header.
 sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW = {});
 
 Time toTime(const ros::Time& time);
@@ -33,13 +34,13 @@ Time toTime(const ros::Time& time);
 ros::Time toRosTime(Time time);
 /// Throws likewise.
 std_msgs::Header toHeader(Time stamp, const std::string& frame, std::uint32_t seq = 0);
-/// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the
-/// stamp in the header is zero.
+/// Converts to m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error that names `topic`
+/// if the stamp in the header is zero.
 ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
                                 const ImuUnits& units = {});
 
-/// Throws std::runtime_error, naming `topic`, where the stamp is zero or the pressure is none (see faultOf).
-/// The variance in the message is not read: most drivers leave it at zero.
+/// Throws std::runtime_error that names `topic` if the stamp is zero or the value is no pressure (see
+/// faultOf). The variance in the message is not read: most drivers leave it at zero.
 Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string& topic);
 
 /// Pose in `odom_frame`, twist in `base_link_frame` (REP-105 names).
@@ -50,24 +51,23 @@ nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_
 geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std::string& odom_frame,
                                             const std::string& base_link_frame, bool inverted);
 
-/// [m^2, rad^2, ...] The variance of what a message has a place for and nobody measured. A large number and
-/// not the -1 of sensor_msgs/Imu: filters (robot_localization) take a covariance as it stands, and one with a
-/// negative variance is none. 1e6 is far above the square of any value that a platform can have, and a filter
-/// can still invert it beside variances of 1e-6.
+/// [m^2, rad^2, ...] Variance of an entry that nobody measured. It is not the -1 of sensor_msgs/Imu: filters
+/// (robot_localization) take a covariance as it is, and a negative variance is invalid. 1e6 is far above the
+/// square of any value that a platform can have, and a filter can still invert it beside variances of 1e-6.
 constexpr double kUnknownVariance = 1e6;
 
-/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame` (x forward, y left, z up). The
-/// radar says nothing of the angular velocity: it is zero with kUnknownVariance.
+/// Converts a velocity `v_R` in the radar's axes, with its covariance, to `radar_frame` (x forward, y left, z
+/// up). The radar does not measure the angular velocity: it is zero with kUnknownVariance.
 geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
                                                   const Eigen::Matrix3d& covariance, Time stamp,
                                                   const std::string& radar_frame);
 
 ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame);
 
-/// The T_IR that a tf transform from the cloud's frame to the IMU stands for. The cloud's frame has the axes
-/// of the cloud (`axes`), T_IR those of RIO (x right, y forward, z up).
+/// Converts a tf transform from the cloud's frame to the IMU to T_IR. The cloud's frame has the axes of the
+/// cloud (`axes`), T_IR those of RIO (x right, y forward, z up).
 Extrinsics toExtrinsics(const geometry_msgs::Transform& T_imu_cloud, PointAxes axes);
-/// The T_BI that a tf transform from the IMU to base_link stands for.
+/// Converts a tf transform from the IMU to base_link to T_BI.
 ImuInBody toImuInBody(const geometry_msgs::Transform& T_base_imu);
 /// T_IR as a pose in `imu_frame`. `covariance` as ScanResult::T_IR_covariance, which has the order of ROS.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
