@@ -45,7 +45,6 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   return row + "\n";
 }
 
-/// Returns what a reader must not overlook.
 std::string remarks(const CalibratedRadar& radar) {
   std::string text;
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis) {
@@ -68,7 +67,7 @@ std::string remarks(const CalibratedRadar& radar) {
     text += "  The mounting differs between the bags by more than the sigmas say: chi-squared " +
             fixedText(extrinsics.chi_squared, 1) + " with " + std::to_string(extrinsics.degrees_of_freedom) +
             " degrees of freedom.\n  The sigmas are " + fixedText(extrinsics.widening(), 1) +
-            " times wider for that reason.\n";
+            " times as wide for that reason.\n";
   }
   return text;
 }

@@ -92,7 +92,6 @@ void describeAids(const RunSummary& summary, const Row& row) {
   }
 }
 
-/// Describes the windows that did not converge.
 void describeSolver(const Counts& terminations, const Row& row) {
   std::uint64_t windows = 0;
   for (const auto& [reason, count] : terminations) windows += count;

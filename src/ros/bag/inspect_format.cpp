@@ -18,8 +18,7 @@ namespace {
 
 using sensor_msgs::PointCloud2;
 
-/// The first message that has points.
-const PointCloud2* example(const CloudTopic& topic) {
+const PointCloud2* firstWithPoints(const CloudTopic& topic) {
   for (const auto& message : topic.messages) {
     if (hasPoints(*message)) return message.get();
   }
@@ -228,7 +227,7 @@ bool isCloudKey(const std::string& key) {
 
 FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& configured) {
   FormatProposal proposal;
-  const PointCloud2* message = example(topic);
+  const PointCloud2* message = firstWithPoints(topic);
   if (message == nullptr) {
     proposal.fault = "all of its clouds are empty";
     proposal.to_do = "Look why the radar sees nothing, and record again.";

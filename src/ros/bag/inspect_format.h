@@ -10,7 +10,6 @@
 
 namespace rio_t {
 
-/// Says how to read a cloud.
 struct FormatProposal {
   std::string fault;                 ///< one sentence that says why the cloud cannot be used; empty: it can
   std::string to_do;                 ///< what to do about the fault
@@ -45,7 +44,6 @@ struct DecodedClouds {
   std::size_t points_not_finite = 0;  ///< other points that it dropped
 };
 
-/// Decodes all clouds of a topic.
 DecodedClouds decodeAll(const CloudTopic& topic, const PointCloudFormat& format);
 
 }  // namespace rio_t

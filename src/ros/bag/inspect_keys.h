@@ -38,7 +38,6 @@ struct ProposedConfig {
   std::vector<std::pair<std::string, ProposedKeys>> radars;  ///< by name; empty: one radar, at the top level
 };
 
-/// Whether the user has configured the key.
 bool isConfigured(const std::string& key, const ParameterEntries& configured);
 
 /// Whether the key belongs to one bag, and so not to a configuration for the next ones.

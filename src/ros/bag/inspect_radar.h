@@ -17,7 +17,6 @@ namespace rio_t {
 /// "100 Hz, gaps: 2 (longest 0.50 s), duplicate stamps: 3"
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates);
 
-/// An IMU of a recording.
 struct ImuInspection : Findings {
   std::string topic;
   std::vector<MessageTimes> times;  ///< of the samples whose stamps are in order
@@ -37,7 +36,6 @@ constexpr double kObservedTurn = 0.3;
 /// [rad] 15 degrees: nobody misjudges a mounting by more by eye.
 constexpr double kFarApart = 0.26;
 
-/// A radar of a recording.
 struct RadarInspection : Findings {
   std::string topic;
   ProposedKeys keys;

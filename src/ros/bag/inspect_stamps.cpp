@@ -147,8 +147,7 @@ std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<
   const auto add = [](const auto& message) {
     try {
       message();
-    } catch (const std::exception&) {
-      // A stamp of zero among valid ones.
+    } catch (const std::exception&) {  // a stamp of zero
     }
   };
   std::vector<RadarScan> stamped;

@@ -132,7 +132,6 @@ void RunOutput::File::flushIfFull() {
 }
 
 FolderLock::FolderLock(const std::string& folder) : descriptor_(open(folder.c_str(), O_RDONLY | O_CLOEXEC)) {
-  // Some file systems have no locks.
   if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   close(descriptor_);
   throw OutputError("output folder " + folder + ": another run writes there; expected a folder of its own");

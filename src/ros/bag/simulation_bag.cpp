@@ -31,7 +31,6 @@ using simulation::SimulatedScan;
 constexpr double kImuLatency = 0.001;        // [s] from stamp to arrival, also of the triggers
 constexpr double kBarometerLatency = 0.002;  // [s] likewise
 
-// What differs between the formats.
 struct Layout {
   std::string scan_topic;
   std::string trigger_topic;
@@ -103,7 +102,6 @@ Layout layoutOf(BagFormat format, const std::string& name) {
   return layout;
 }
 
-// What one radar writes.
 struct RadarTrack {
   const std::vector<SimulatedScan>* scans;
   Layout layout;

@@ -17,7 +17,6 @@ struct CalibrationRun {
   bool shows_progress = false;  ///< draws a progress bar for each bag
 };
 
-/// The outcome of one bag.
 struct CalibrationBag {
   std::string path;
   std::string failure;  ///< why it does not count; empty: it counts
@@ -46,7 +45,6 @@ std::string failureOf(const RunSummary& summary);
 /// Returns a table with the configured and the found values, sigmas and verdicts. If a value was not
 /// observed, it says which motion would show it.
 std::string describeCalibration(const BagCalibration& calibration);
-/// The part of one radar.
 std::string describeCalibration(const CalibratedRadar& radar);
 
 /// Returns the configuration to use next time, as YAML: what the user gave, with offset and extrinsics of

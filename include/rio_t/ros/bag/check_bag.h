@@ -27,7 +27,6 @@ enum class FindingLevel {
   kMissing,  ///< "missing": the odometry cannot run
 };
 
-/// One line of the report.
 struct Finding {
   FindingLevel level = FindingLevel::kOk;
   std::string subject;  ///< "IMU", "radar /scan", ...
@@ -66,7 +65,6 @@ std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> path
 /// Looks at one recording as `request` says. Throws std::runtime_error for a bag that cannot be read.
 BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request);
 
-/// The report for people.
 std::string describeCheck(const BagCheck& check);
 
 /// Throws std::invalid_argument if the request cannot be met, and ConfigError for parameters that are wrong.

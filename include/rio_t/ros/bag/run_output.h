@@ -85,7 +85,6 @@ struct RunFiles {
   std::vector<RunFile> all() const;  ///< all except summary.yaml
   std::vector<std::string> names() const;
 };
-/// The files of a run with this configuration.
 RunFiles runFiles(const Config& config);
 
 /// A file of the run cannot be written. The bag is not at fault.
