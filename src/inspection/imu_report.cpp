@@ -15,17 +15,18 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;    // [m/s^2]
-constexpr double kMeanWidth = 0.2;   // [s] over which a direction of gravity is averaged, at least
-constexpr std::size_t kApart = 3;    // [means] between the two directions that are compared: about 0.6 s
-constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
-constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.6 s that show the unit
+constexpr double kGravity = 9.81;   // [m/s^2]
+constexpr double kMeanWidth = 0.2;  // [s] over which a direction of gravity is averaged, at least
+constexpr std::size_t kApart =
+    3;  // [means] between the two directions of gravity that are compared: about 0.6 s
+constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns faster for a tenth of the time
+constexpr double kLeastTilt = 0.03;  // [rad] rms of gravity's turns in 0.6 s; less does not show the unit
 
-/// Means of the specific force, in steps of `kMeanWidth` or, of a slow IMU, a little more, and the turn from
-/// one to the next, by the gyro.
+/// Means of the specific force over steps of `kMeanWidth` (a slow IMU has slightly longer steps), and the
+/// gyro's rotation from each step to the next.
 struct Steps {
   std::vector<Vector3d> force;
-  /// Integral of the rates, as written, from the middle of a step to that of the next.
+  /// Integral of the rates, as written, between the middles of neighbouring steps.
   std::vector<Vector3d> turn;
 };
 
@@ -56,13 +57,13 @@ Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
   return steps;
 }
 
-/// Sum of squares of what a scale on the rates leaves of the changes of the specific force.
+/// Sum of squares of the changes of the specific force that the rates, times `scale`, do not explain.
 double misfit(const Steps& steps, double scale) {
   double sum = 0.0;
   for (std::size_t i = 0; i + kApart < steps.force.size(); ++i) {
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
     for (std::size_t k = i; k < i + kApart; ++k) turn = turn * so3::exp(scale * steps.turn[k]);
-    // A force that stands still in the world turns against the IMU.
+    // In the IMU frame, a force that is constant in the world turns the other way.
     sum += std::min((steps.force[i + kApart] - turn.conjugate() * steps.force[i]).squaredNorm(), 25.0);
   }
   return sum;
@@ -70,7 +71,7 @@ double misfit(const Steps& steps, double scale) {
 
 void findAccelerationUnit(double least_norm, ImuReport* report) {
   const double norm = report->written_norm;
-  // The least accelerated moments show gravity, in m/s^2 or in g.
+  // The smallest norms show gravity, in m/s^2 or in g.
   if (least_norm < 0.5 && norm < 8.0) {
     report->acceleration_fault =
         "gravity is missing: the acceleration at rest is near zero, and rio_t needs the raw specific force";
@@ -104,7 +105,7 @@ void findRateUnit(const std::vector<ImuMeasurement>& imu, double fast, ImuReport
         "are left-handed";
 }
 
-/// Returns how many there were.
+/// Leaves out samples that repeat the one before. Returns their number.
 std::size_t leaveOutRepeats(std::vector<ImuMeasurement>* imu) {
   ImuSampleCheck check{ImuInputCheckOptions()};
   std::vector<ImuMeasurement> kept;
@@ -139,9 +140,9 @@ void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 }
 
 void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
-  constexpr double kStart = 10.0;  // [s] in which the rest must be complete
+  constexpr double kStart = 10.0;  // [s] from the start within which the rest must be complete
   StaticInitializerOptions options;
-  options.max_gravity_error = 2.0;  // what is off by more is reported as such
+  options.max_gravity_error = 2.0;  // a larger error is reported as a fault of the acceleration
   StaticInitializer rest(options, kGravity);
   const Time begin = imu.front().time;
   ImuInputCheck check(0.04, {});  // measures the noise, which a vibrating frame has at rest, too

@@ -21,24 +21,27 @@ constexpr std::size_t kMinVelocities = 6;  // of a window: two lines take four
 constexpr double kMinMotion = 0.25;        // [m/s] that a window must exceed to count as motion
 constexpr double kGravity = 9.81;          // [m/s^2] anywhere on earth to 0.03
 constexpr double kLeverArmSigma = 0.5;     // [m] per axis, around zero
-constexpr double kVelocitySigma = 0.08;    // [m/s] of what a velocity and the IMU over a window do not model
-constexpr double kGravitySigma = 0.5;      // [m/s^2] of the mean specific force: 3 degrees
-constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of the gravity from a rest: bias of the accelerometer
-constexpr double kGyroDrift = 3.0e-4;      // [rad/s] with which the gyro loses it: what is left of its bias
-constexpr double kOutlier = 3.0;           // [sigma] from which on a velocity counts less
+constexpr double kVelocitySigma =
+    0.08;  // [m/s] errors that neither the covariance of a velocity nor that of the IMU contains
+constexpr double kGravitySigma = 0.5;      // [m/s^2] of gravity by the mean specific force: 3 degrees
+constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of gravity by a rest: the bias of the accelerometer
+constexpr double kGyroDrift =
+    3.0e-4;  // [rad/s] what is left of the gyro's bias, by which gravity from a rest drifts
+constexpr double kOutlier = 3.0;  // [sigma] a velocity that is farther off counts less than half
 
-/// A window adds to the mounting its first velocity in G and the gravity in G.
+/// Each window has six unknowns besides the mounting: its first velocity in G, and gravity in G.
 constexpr Eigen::Index kMounting = kMountingM + kMountingL, kOwn = 6, kUnknowns = kMounting + kOwn;
 
-/// A velocity gives three rows, A x = y + w + noise, with x = (M, l, v_w, g_w). The noise is its own; w is
-/// the random walk of the IMU's noise since the beginning of the window.
+/// A velocity gives three rows, A x = y + w + noise, with x = (M, l, v_w, g_w). Each velocity has its own
+/// noise; w is the random walk of the IMU's noise since the beginning of the window.
 struct Rows {
   MatrixXd Ay = MatrixXd::Zero(3, kUnknowns + 1);  ///< A, and y as the last column
-  Matrix3d covariance;                             ///< of its own noise
+  Matrix3d covariance;                             ///< of the velocity's own noise
   double walked = 0.0;                             ///< variance that w gained since the velocity before
 };
 
-/// Covariance of a velocity in G. It is known in R; before M is, its mean stands for all axes.
+/// Returns the covariance of a velocity in G. It is known in R. Without an estimate of M, its mean serves for
+/// all axes.
 Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const std::optional<Matrix3d>& M) {
   const Matrix3d model = kVelocitySigma * kVelocitySigma * Matrix3d::Identity();
   if (!M) return model + velocity.covariance.trace() / 3.0 * Matrix3d::Identity();
@@ -77,9 +80,9 @@ double gravitySigma(Time time, const MountingSearchOptions& options) {
   return std::min(kGravitySigma, std::hypot(kRestGravitySigma, kGravity * tilt));
 }
 
-/// The cost of all unknowns of a window. All later velocities share the walk. A Kalman filter of the walk
-/// takes out what the earlier ones tell about it: the innovations are independent. So the cost is that of the
-/// covariance of the whole window, and takes time in proportion to their number, not to its cube.
+/// Returns the cost of all unknowns of a window. Its velocities share the random walk w. A Kalman filter of w
+/// makes their innovations independent. The sum of squares of these equals the cost with the covariance of
+/// the whole window, but the time is linear in their number, not cubic.
 Quadratic costOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
                  const MountingProblem& problem) {
   MatrixXd sum = MatrixXd::Zero(kUnknowns + 1, kUnknowns + 1);
@@ -177,14 +180,15 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingPr
       const Rows& rows = all[i];
       walked += rows.walked;
       const Vector3d e = rows.Ay.leftCols(kUnknowns) * x - rows.Ay.col(kUnknowns);
-      // Its own covariance, whatever weight it has had.
+      // The covariance without the weight so far.
       const Matrix3d covariance = window[i].weight * rows.covariance + walked * Matrix3d::Identity();
       const double square = e.dot(covariance.ldlt().solve(e)) / 3.0;
       squares.push_back(square);
       window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
     }
   }
-  constexpr double kMeanOverMedian = 1.27;  // of a mean of three squares: chi-squared has its median at 2.37
+  constexpr double kMeanOverMedian =
+      1.27;  // of chi-squared with three degrees of freedom, whose median is 2.37
   return std::max(1.0, kMeanOverMedian * quantile(std::move(squares), 0.5));
 }
 

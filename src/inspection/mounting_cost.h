@@ -8,7 +8,7 @@
 
 namespace rio_t {
 
-/// cost(x) = x' H x - 2 b' x + c. Of dynamic size: that compiles in a tenth of the time.
+/// cost(x) = x' H x - 2 b' x + c. The size is dynamic, since that compiles in a tenth of the time.
 struct Quadratic {
   explicit Quadratic(Eigen::Index size)
       : H(Eigen::MatrixXd::Zero(size, size)), b(Eigen::VectorXd::Zero(size)) {}
@@ -18,8 +18,7 @@ struct Quadratic {
   double c = 0.0;
 };
 
-/// Eliminates the last `count` unknowns: each value of the others then costs what it costs with the best
-/// values of these.
+/// Eliminates the last `count` unknowns: the cost of the others is then that with the best values of these.
 Quadratic withoutLast(const Quadratic& cost, Eigen::Index count);
 
 /// A velocity with its weight in a robust loss.
@@ -29,14 +28,14 @@ struct WeightedVelocity {
 };
 using VelocityWindow = std::vector<WeightedVelocity>;
 
-/// The search finds the mounting that fits these windows of velocities to the track of the IMU.
+/// The search fits the mounting to these windows of velocities and to the track of the IMU.
 struct MountingProblem {
   const InertialTrack& track;
   const MountingSearchOptions& options;
   std::vector<VelocityWindow> windows;
 };
 
-/// Windows with motion, of velocities that the IMU covers with any offset up to `reach` [s].
+/// Returns the windows with motion. The IMU covers their velocities for any offset up to `reach` [s].
 std::vector<VelocityWindow> windowsOf(const std::vector<RadarVelocity>& velocities,
                                       const InertialTrack& track, double reach);
 
@@ -51,8 +50,8 @@ Eigen::VectorXd columnsOf(const Eigen::Matrix3d& M);
 Quadratic mountingCost(double offset, const std::optional<Eigen::Matrix3d>& M,
                        const MountingProblem& problem);
 
-/// Sets the weights of the velocities for a mounting, those of a Cauchy loss. Returns how badly the
-/// velocities fit it: the mean [sigma^2] per axis, from the median; at least 1.
+/// Sets the weights of the velocities for a mounting, by a Cauchy loss. Returns how badly the velocities fit:
+/// the mean square [sigma^2] per axis, computed from the median; at least 1.
 double reweigh(double offset, const Eigen::Matrix3d& M, const Eigen::Vector3d& l_I, MountingProblem* problem);
 
 }  // namespace rio_t

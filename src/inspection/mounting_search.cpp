@@ -16,14 +16,15 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kMinDuration = 3.0;    // [s] of motion, below which nothing is said
+constexpr double kMinDuration = 3.0;    // [s] of motion; with less, the search gives no result
 constexpr double kOffsetStep = 0.01;    // [s]
 constexpr double kLevelSigma = 0.17;    // [rad] of the roll, if nothing else is known
 constexpr double kAheadSigma = 0.5;     // [rad] of the pitch, likewise
-constexpr double kUprightWeight = 9.0;  // [sigma^2] a quarter of what upside down costs more than upright
-constexpr double kClear = 25.0;         // [sigma^2] from which on a sign is taken for known
-constexpr double kAlike = 2.0;          // errors of a window are alike: they count as half as many
-constexpr double kOffsetFactor = 3.0;   // velocities of noisy points draw the bottom of the curve to the side
+constexpr double kUprightWeight = 9.0;  // [sigma^2] upside down costs four times this more than upright
+constexpr double kClear = 25.0;         // [sigma^2] a sign that fits better by this counts as known
+constexpr double kAlike = 2.0;          // errors within a window are correlated: they count as half as many
+constexpr double kOffsetFactor =
+    3.0;  // widens the sigma, since velocities of noisy points shift the bottom of the curve
 
 /// A mounting M = sign R, and what it costs.
 struct Found {
@@ -38,8 +39,9 @@ double costOf(const Quadratic& cost, const Matrix3d& M) {
   return m.dot(cost.H * m) - 2.0 * cost.b.dot(m) + cost.c;
 }
 
-/// Without a motion that shows it, a radar stands upright, does not roll and looks ahead: its right axis is
-/// level, its forward axis nearly so. In M = sign R a level axis costs the same for both signs.
+/// Adds a weak prior for a mounting that the motion does not show: the radar is upright, does not roll and
+/// looks ahead. So its right axis is level, and its forward axis nearly so. In M = sign R a level axis costs
+/// the same for both signs.
 Quadratic withUpright(Quadratic cost, const std::optional<Vector3d>& up_I, int sign) {
   if (!up_I) return cost;
   VectorXd level = VectorXd::Zero(kMountingM), ahead = VectorXd::Zero(kMountingM),
@@ -63,7 +65,7 @@ MatrixXd tangent(const Matrix3d& M) {
   return J;
 }
 
-/// The rotation nearby that costs least, by Levenberg-Marquardt.
+/// Returns the rotation near `start` that costs least, by Levenberg-Marquardt.
 Found descend(const Quadratic& cost, int sign, const Matrix3d& start) {
   Eigen::Quaterniond q(start);
   double lambda = 1e-3;
@@ -99,7 +101,7 @@ Found descendFromAllTurns(const Quadratic& cost, int sign) {
   return best;
 }
 
-/// The cost over the offset, each with the rotation that fits it best.
+/// The costs over the offset, each with the best rotation.
 struct Curve {
   std::vector<double> costs;  // a value for each step of the offset
   Found least;                // the mounting that costs least over all offsets
@@ -131,7 +133,7 @@ BySign tryOffsets(int first, int last, const std::optional<Matrix3d>& M,
 void chooseSign(const BySign& curves, double unit, int sign_from_ranges, MountingSearch* result) {
   const double difference = (curves[1].least.cost - curves[0].least.cost) / unit;  // > 0: receding is better
   const int likelier = difference < 0.0 ? -1 : 1;
-  // Against the ranges the IMU must be twice as sure.
+  // The IMU must be twice as sure if it contradicts the ranges.
   const bool contradicts = sign_from_ranges != 0 && sign_from_ranges != likelier;
   const bool imu_tells = std::abs(difference) > (contradicts ? 4.0 * kClear : kClear);
   result->sign_significance = std::abs(difference);
@@ -156,9 +158,9 @@ int findOffset(const std::vector<double>& costs, int first, int steps, double sc
   return first + bottom;
 }
 
-/// Half the second derivative of the cost by a turn in R, no smaller than 0. It has the second derivative of
-/// M, too: without it, the noise of the velocities, which costs the same for all rotations, counts as
-/// information.
+/// Returns half the second derivative of the cost with respect to a turn in R, with no negative eigenvalue.
+/// It includes the second derivative of M. Without that, the noise of the velocities, which costs the same
+/// for all rotations, would count as information.
 Matrix3d curvature(const Quadratic& cost, const Matrix3d& M) {
   const MatrixXd J = tangent(M);
   const VectorXd gradient = cost.H * columnsOf(M) - cost.b;
@@ -173,8 +175,8 @@ Matrix3d curvature(const Quadratic& cost, const Matrix3d& M) {
          axes.eigenvectors().transpose();
 }
 
-/// Sets the sigmas that the data alone give, without prior knowledge. `cost`: depends on M alone, and costs
-/// noise the same in all directions; `H_l`: the information about the lever arm.
+/// Sets the sigmas by the data alone, without the prior. `cost` depends only on M and has the same variance
+/// on all axes. `H_l` is the information about the lever arm.
 void setSigmas(const Quadratic& cost, const Matrix3d& H_l, double unit, MountingSearch* result) {
   const Matrix3d R = result->q_IR.toRotationMatrix();
   const Matrix3d in_R = curvature(cost, result->sign * R) / unit;
@@ -184,8 +186,8 @@ void setSigmas(const Quadratic& cost, const Matrix3d& H_l, double unit, Mounting
   result->lever_arm_sigma = std::sqrt(unit) * H_l.inverse().diagonal().cwiseSqrt();
 }
 
-/// Whether another mounting, far off, fits as well: a vehicle that only drives ahead does not show whether
-/// its radar is upside down.
+/// If another mounting, far off, fits as well, its axis counts as not observed. A vehicle that only drives
+/// ahead does not show whether its radar is upside down.
 void findOtherMounting(const Quadratic& cost, double square, MountingSearch* result) {
   constexpr double kFar = 1.0;  // [rad]
   const Matrix3d R = result->q_IR.toRotationMatrix();
@@ -240,7 +242,8 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
   result.enough = durationOf(problem.windows) >= kMinDuration;
   if (!result.enough) return result;
 
-  // The first round looks at all offsets, the later ones around the bottom, with the noise as it was found.
+  // The first round tries all offsets. The later ones try those around the best, with the noise that was
+  // found.
   constexpr int kRounds = 3, kNear = 5;
   const int steps = static_cast<int>(std::lround(kMaxSearchedOffset / kOffsetStep));
   int middle = 0;
@@ -269,8 +272,8 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
                          with_lever_arm.H.bottomLeftCorner(kMountingL, kMountingM) * columnsOf(*M));
     scale = reweigh(result.offset, *M, result.lever_arm_I, &problem);
   }
-  // With covariances that are turned by M, any other turn puts the noisy axis where little noise is expected:
-  // noise would look like evidence.
+  // Here each velocity has one variance for all axes. With covariances that M turns, any other turn would put
+  // the noisy axis where little noise is expected, and noise would look like evidence.
   const Quadratic even = withoutLast(mountingCost(result.offset, std::nullopt, problem), kMountingL);
   setSigmas(even, H_l, kAlike * scale, &result);
   findOtherMounting(even, kAlike * scale, &result);

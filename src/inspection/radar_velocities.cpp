@@ -13,7 +13,7 @@ namespace rio_t {
 namespace {
 
 constexpr double kGroupSpan = 0.12;      // [s]
-constexpr double kFlatElevation = 0.02;  // [rad] of nine points in ten: below, the radar has no elevation
+constexpr double kFlatElevation = 0.02;  // [rad] if nine in ten points are below, the radar has no elevation
 constexpr double kVerticalSigma = 1.0;   // [m/s] of a radar without elevation
 
 bool hasElevation(const std::vector<RadarScan>& scans) {
@@ -27,10 +27,10 @@ bool hasElevation(const std::vector<RadarScan>& scans) {
   return 10 * flat < 9 * all;
 }
 
-/// The next scans, from `*next` on, as one.
+/// Combines the next scans, from `*next` on, to one.
 RadarScan nextGroup(const std::vector<RadarScan>& scans, std::size_t* next) {
   RadarScan group = scans[*next];
-  double stamps = 0.0;  // mean, from the first on, weighted with the points
+  double stamps = 0.0;  // sum of the stamps after the first, weighted with the points
   const Time first = group.stamp;
   for (++*next; *next < scans.size() && group.points.size() < ScanPool::kEnoughPoints; ++*next) {
     const RadarScan& scan = scans[*next];
@@ -43,7 +43,8 @@ RadarScan nextGroup(const std::vector<RadarScan>& scans, std::size_t* next) {
   return group;
 }
 
-/// Without elevation the vertical velocity is not seen: points straight up and down say that it is zero.
+/// A radar without elevation does not see the vertical velocity. Adds points straight up and down that show
+/// it as zero.
 void addVertical(RadarScan* scan) {
   const std::size_t count = 1 + scan->points.size() / 8;
   for (std::size_t i = 0; i < count; ++i) {
@@ -78,8 +79,9 @@ struct RangedScan {
   std::vector<RangedPoint> points;
 };
 
-/// Every n-th scan is compared, at 20 to 40 Hz. At 20 Hz a scan has ten partners; the pairs would grow with
-/// the square of the rate, and say no more, as neighbouring scans show the same things.
+/// Every n-th scan is compared, so that the rate is 20 to 40 Hz. At 20 Hz a scan has ten partners. The number
+/// of pairs grows with the square of the rate, and more pairs show no more, since neighbouring scans see the
+/// same things.
 std::size_t stepOf(const std::vector<RadarScan>& scans) {
   constexpr double kRate = 20.0;  // [Hz]
   const double span = scans.empty() ? 0.0 : scans.back().stamp - scans.front().stamp;
@@ -88,7 +90,7 @@ std::size_t stepOf(const std::vector<RadarScan>& scans) {
 }
 
 std::vector<RangedScan> rangedScans(const std::vector<RadarScan>& scans) {
-  // Each point is compared with each of the other scan. So many show the sign, and more take minutes.
+  // Each point is compared with each point of the other scan. So many show the sign; more take minutes.
   constexpr std::size_t kMost = 200;
   std::vector<RangedScan> result;
   const std::size_t step = stepOf(scans);
@@ -120,7 +122,7 @@ void forPairs(const std::vector<RangedScan>& scans, const InertialTrack& track, 
   }
 }
 
-/// Half of what nine Dopplers in ten stay below: noise matters little above. It needs no unit.
+/// Returns half of the 90 % quantile of the Doppler: above it, noise matters little. It needs no unit.
 double largeDoppler(const std::vector<RadarScan>& scans) {
   std::vector<double> dopplers;
   for (const RadarScan& scan : scans)
@@ -128,12 +130,12 @@ double largeDoppler(const std::vector<RadarScan>& scans) {
   return 0.5 * quantile(std::move(dopplers), 0.9);
 }
 
-/// How many matches agree on a ratio, over the logarithm of the ratio, for both signs.
+/// Counts how many matches agree on a ratio, over the logarithm of the ratio, for both signs.
 class RatioVotes {
  public:
   RatioVotes() : votes_(2 * kBins, 0.0) {}
 
-  /// A range changed by `change`, and the Doppler says `shift` [m].
+  /// Adds a range that changed by `change`, while the Doppler says `shift` [m].
   void add(double change, double shift) {
     const double size = std::abs(change), said = std::abs(shift);
     const std::size_t sign = (change > 0.0) == (shift > 0.0) ? 0 : kBins;
@@ -147,8 +149,8 @@ class RatioVotes {
   void add(const RatioVotes& other, double sign) {
     for (std::size_t k = 0; k < votes_.size(); ++k) votes_[k] += sign * other.votes_[k];
   }
-  /// The logarithm of the ratio that leads its contrary, the same with the other sign, by the most votes:
-  /// matches by chance vote for both alike.
+  /// Returns the logarithm of the ratio that has the most votes beyond those of the same ratio with the other
+  /// sign. Matches by chance vote for both alike.
   double peak() const {
     std::size_t top = 0;
     for (std::size_t k = 1; k < votes_.size(); ++k)
@@ -160,7 +162,7 @@ class RatioVotes {
     return logOf(static_cast<double>(bin) + (curvature < 0.0 ? 0.5 * (before - after) / curvature : 0.0));
   }
 
-  static constexpr double kTolerance = 0.1;  ///< [m] a match that is farther off is none
+  static constexpr double kTolerance = 0.1;  ///< [m] pairs that are farther off are no match
 
  private:
   static constexpr double kLargest = 200.0, kStep = 0.02;

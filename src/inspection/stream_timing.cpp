@@ -10,13 +10,13 @@
 namespace rio_t {
 namespace {
 
-/// [s] The clock of the records may run oddly over a bag, but hardly within this.
+/// [s] The clock of the records may drift over a bag, but hardly within this.
 constexpr double kRecordedNear = 0.5;
-/// Messages of the IMU before a scan that are compared with it. A bus may hand over several at once, the
-/// newest last. More would compare a scan with samples of another time.
+/// The last IMU messages before a scan are compared with it. A bus may hand over several at once, the newest
+/// last. With more of them, a scan would be compared with samples of another time.
 constexpr std::size_t kCompared = 8;
 
-/// Sets the rate and the burst, if the intervals show bursts around this median.
+/// Sets rate and burst, and returns true, if the intervals show bursts.
 bool findBursts(const std::vector<double>& intervals, double median, double factor, StreamTiming* timing) {
   constexpr std::size_t kEnoughBursts = 10;
   constexpr double kMostOfTheTime = 0.8, kLeastBurst = 2.5;
@@ -85,7 +85,7 @@ std::optional<StreamDelay> delayAgainstImu(const std::vector<MessageTimes>& time
       smallest = std::min(smallest, imu[i].record.nanoseconds() - imu[i].stamp.nanoseconds());
     delays.push_back(Time::fromNanoseconds(each.record.nanoseconds() - smallest) - each.stamp);
   }
-  // Written topic after topic: the times of the records say nothing.
+  // The topics were recorded one after the other, so the record times show nothing.
   if (10 * delays.size() < times.size()) return std::nullopt;
   return StreamDelay{quantile(delays, 0.5), quantile(delays, 0.9)};
 }

@@ -7,14 +7,14 @@
 
 namespace rio_t {
 
-/// A recording of an IMU, integrated once from its first sample, for questions about any two of its times.
+/// A recording of an IMU, integrated once. It answers questions about any two of its times.
 ///
-/// G is the frame of the IMU at the first sample, carried by the gyro. It drifts as the gyro does, so what is
-/// read off spans some seconds only.
+/// G is the frame of the IMU at the first sample, which the gyro carries on. It drifts with the gyro, so only
+/// differences over some seconds are good.
 class InertialTrack {
  public:
-  /// `imu` in the order of time; samples that are not later than the one before are left out. `gyro_bias` is
-  /// taken off [rad/s].
+  /// `imu`: in the order of time; samples that are not later than the one before are left out. `gyro_bias` is
+  /// subtracted [rad/s].
   InertialTrack(const std::vector<ImuMeasurement>& imu, const Eigen::Vector3d& gyro_bias);
 
   bool covers(Time time) const { return !times_.empty() && times_.front() <= time && time <= times_.back(); }
@@ -26,8 +26,8 @@ class InertialTrack {
   Eigen::Vector3d impulse(Time time) const;
   /// Mean angular velocity in I around a time, over 40 ms, as far as there are samples [rad/s].
   Eigen::Vector3d rate(Time time) const;
-  /// Mean specific force in G over 15 s around a time, turned round and scaled to `gravity` [m/s^2]: what the
-  /// platform accelerates cancels over so long a time.
+  /// Gravity in G [m/s^2]: the mean specific force over 15 s around a time, negated and scaled to `gravity`.
+  /// Over so long a time the accelerations of the platform cancel.
   Eigen::Vector3d gravity(Time time, double gravity) const;
 
   Time begin() const { return times_.front(); }
@@ -39,7 +39,7 @@ class InertialTrack {
   std::vector<Time> times_;
   std::vector<Eigen::Quaterniond> q_GI_;
   std::vector<Eigen::Vector3d> impulse_;
-  std::vector<std::size_t> gaps_;  ///< n gaps up to each sample
+  std::vector<std::size_t> gaps_;  ///< number of gaps up to each sample
 };
 
 }  // namespace rio_t

@@ -10,31 +10,33 @@
 
 namespace rio_t {
 
-/// [s] The search looks at offsets up to this, to either side: a little beyond the default max_time_offset.
+/// [s] The search tries offsets up to this, to either side: slightly more than the default max_time_offset.
 inline constexpr double kMaxSearchedOffset = 0.3;
 
 struct MountingSearchOptions {
   double accel_density = 0.02;  ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
-  /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the
-  /// mean of the specific force stands for it.
+  /// Gravity in G from a rest [m/s^2], and the end of this rest; the gyro carries it on. Without a rest, the
+  /// mean of the specific force gives gravity.
   std::optional<Eigen::Vector3d> gravity_G;
   Time rest_end;
-  /// The sign by the ranges (DopplerSign); 0: they do not show it.
+  /// The sign that the ranges show (DopplerSign); 0: none.
   int sign_from_ranges = 0;
-  /// Up in I at rest, or on average; without one, no mounting is more likely than another.
+  /// The direction that points up in I, at rest or on average. Without it, all mountings are equally likely a
+  /// priori.
   std::optional<Eigen::Vector3d> up_I;
 };
 
-/// The mounting of a radar as a recording shows it.
+/// What a recording shows of the mounting of a radar.
 struct MountingSearch {
   bool enough = false;  ///< whether there was enough motion to look at; if not, the rest is empty
 
-  /// v_I = sign q_IR v_R - omega x l: as found, with q_IR a rotation.
+  /// v_I = sign q_IR v_R - omega x l, with q_IR a rotation.
   int sign = 1;
-  /// Whether the IMU tells the sign: the best mounting of the other sign fits so much worse [sigma^2].
+  /// How clearly the IMU shows the sign: by this much, the best mounting with the other sign fits worse
+  /// [sigma^2].
   double sign_significance = 0.0;
-  /// The ranges say one sign, the IMU the other: one axis of the cloud is inverted, or two are swapped, or
-  /// the accelerometer is negated.
+  /// Ranges and IMU show contrary signs: one axis of the cloud is inverted, or two are swapped, or the
+  /// accelerometer is negated.
   bool mirrored = false;
   Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();   ///< [rad] about the axes of I; pi: not observed

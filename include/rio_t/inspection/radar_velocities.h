@@ -9,7 +9,7 @@
 
 namespace rio_t {
 
-/// Velocity that a scan, or some neighbouring ones together, show by themselves.
+/// The velocity that one scan, or a few neighbouring scans, show without the IMU.
 struct RadarVelocity {
   Time stamp;
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< of the radar, in its own axes [m/s]
@@ -22,32 +22,31 @@ struct RadarVelocities {
   bool has_elevation = true;
 };
 
-/// Velocities for an inspection: no filter by range, power or field of view, and no prior. Scans of few
-/// points are put together, up to 20 points and 0.12 s. The velocity of a radar without elevation has no
-/// vertical part, with a sigma of 1 m/s. `scans` in the order of their stamps.
+/// Computes velocities without a prior and without a filter by range, power or field of view. Combines scans
+/// of few points, up to 20 points and 0.12 s. The velocity of a radar without elevation has no vertical part,
+/// with a sigma of 1 m/s. `scans`: in the order of their stamps.
 RadarVelocities radarVelocities(const std::vector<RadarScan>& scans);
 
-/// Which sign the ranges give the Doppler.
+/// The sign of the Doppler that the ranges show.
 struct DopplerSign {
   /// +1: positive for receding targets; -1: for approaching ones; 0: the ranges do not show it.
   int sign = 0;
   double significance = 0.0;  ///< mean vote over its standard deviation; positive for receding
 };
 
-/// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the
-/// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more
-/// than 7 degrees do not count. Of a radar with 40 Hz or more, every n-th scan is compared.
+/// Compares the points of scans that lie 0.15 to 0.6 s apart: with the correct sign, a range changes as its
+/// Doppler says. This needs neither the axes nor the mounting. Pairs between which the platform turns by more
+/// than 7 degrees do not count. At 40 Hz or more, only every n-th scan is compared.
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
-/// By how much the ranges change, divided by what the Doppler says: 1 if it is in m/s.
+/// The change of the ranges divided by the change that the Doppler says: 1 if the Doppler is in m/s.
 struct RangeRatio {
-  double ratio = 0.0;      ///< of their sizes, without a sign; 0: the ranges do not show it
+  double ratio = 0.0;      ///< without a sign; 0: the ranges do not show it
   double log_sigma = 0.0;  ///< of its logarithm
 };
 
-/// Compares the points of the same pairs of scans, with any ratio from 1 / 200 to 200 and either sign. The
-/// ratio on which most matches agree is the likeliest. Its sigma is that of a jackknife over parts of the
-/// recording.
+/// Compares the points of the same pairs of scans, with any ratio from 1 / 200 to 200 and either sign. Takes
+/// the ratio on which the most matches agree. Its sigma is that of a jackknife over parts of the recording.
 RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
 }  // namespace rio_t
