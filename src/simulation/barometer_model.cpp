@@ -50,7 +50,7 @@ std::vector<SimulatedPressure> simulateBarometer(const Motion& motion, const Bar
   Random random(seed, kBarometerStream);
   const double step = 1.0 / options.rate;
   double drift = 0.0;
-  // Not in phase with the IMU.
+  // Out of phase with the IMU.
   for (double t = 0.3 * step; t < motion.duration(); t += step) {
     drift += options.drift * std::sqrt(step) * random.gaussian();
     SimulatedPressure pressure;

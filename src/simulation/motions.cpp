@@ -13,7 +13,7 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kSampleStep = 0.01;  // [s] of the poses that the spline is put through
+constexpr double kSampleStep = 0.01;  // [s] between the poses from which the spline is made
 static_assert(kLongest == kMostSamples * kSampleStep);
 constexpr std::uint64_t kMotionStream = 1;
 constexpr double kWalkingPace = 1.3;    // [m/s]
@@ -224,7 +224,7 @@ struct Section {
     return s * s;
   }
 };
-// Each begins where the one before ends.
+// Each section begins at the end of the one before.
 using Course = std::vector<Section>;
 
 const Section& sectionAt(const Course& course, double t) {
@@ -390,9 +390,8 @@ Motion makeMotion(const MotionRequest& request) {
     if (!poses.empty() && pose.time <= poses.back().time) break;
     poses.push_back(pose);
   }
-  SplineFitOptions fit;
-  fit.cutoff = 25.0;  // the poses are free of noise: follow them
-  return Motion(TrajectorySpline(poses, fit), rest);
+  constexpr double kCutoff = 25.0;  // [Hz] high, since the poses have no noise
+  return Motion(TrajectorySpline(poses, kCutoff), rest);
 }
 
 }  // namespace rio_t::simulation

@@ -57,7 +57,7 @@ Preset kart() {
   return p;
 }
 
-// The kart with a second radar that looks to the other side. Nothing triggers both: they are out of phase.
+// The kart with a second radar that looks to the other side. They share no trigger, so they are out of phase.
 Preset kartPair() {
   Preset p = kart();
   p.name = "kart_pair";

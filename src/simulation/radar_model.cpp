@@ -23,7 +23,7 @@ constexpr std::uint64_t kLatencyStream = 24;
 constexpr std::uint64_t kCrowdStream = 25;
 constexpr std::uint64_t kAmbiguousStream = 26;
 
-// [m] Reflectors lie no farther from their station on the level: a little beyond the range of such a radar.
+// [m] Largest horizontal distance of a reflector from its station: a little beyond the range of such a radar.
 constexpr double kSceneRadius = 13.0;
 
 void check(const RadarModelOptions& o) {
@@ -55,7 +55,7 @@ void check(const RadarModelOptions& o) {
   require(o.doppler_step >= 0.0, "Doppler quantisation cannot be negative");
   require(o.doppler_span >= 0.0, "Doppler span (doppler-span) cannot be negative");
   if (o.doppler_span > 0.0 && o.doppler_step > 0.0) {
-    // The bins of a Fourier transform: a value beyond the last of them must be the first one again.
+    // The radar has the bins of a Fourier transform: the value beyond the last bin is the first one again.
     const double steps = o.doppler_span / o.doppler_step;
     require(steps > 0.5 && std::abs(steps - std::round(steps)) < 1e-6 * steps,
             "Doppler span (doppler-span) must be a whole number of steps (doppler-step)");
@@ -66,7 +66,6 @@ void check(const RadarModelOptions& o) {
   require(o.crowd >= 1, "a crowd must be one person or more");
 }
 
-// Where the radar is and how it moves.
 struct RadarState {
   Eigen::Vector3d p_W;
   Eigen::Quaterniond q_WR;
@@ -78,7 +77,7 @@ RadarState radarState(const MotionState& imu, const Extrinsics& T_IR) {
           imu.v_W + imu.q_WI * imu.omega_I.cross(T_IR.l_I)};
 }
 
-// Not elevationOf(), which rounds another way: the same seed must give the same bag for good.
+// Not elevationOf(), which rounds differently: the same seed must always give the same bag.
 double elevation(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), std::hypot(p_R.x(), p_R.y())); }
 
 /// A point at this range, anywhere in the view.
@@ -100,7 +99,6 @@ double rangeRate(const RadarState& radar, const Eigen::Vector3d& p_W, const Eige
   return (p_W - radar.p_W).normalized().dot(v_W - radar.v_W);
 }
 
-// Somebody who walks past.
 struct Person {
   double from = 0.0, until = 0.0;                 // [s]
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  // at `from`
@@ -132,7 +130,7 @@ std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o
     const double until = std::min(t + kMeanVisit * random.uniform(0.5, 1.5), motion.duration());
     const RadarState radar = radarState(motion.at(t), T_IR);
     persons.push_back(makePerson(radar, t, until, random));
-    // From a sequence of their own, so that the visits and their first persons are the same for any crowd.
+    // The others have a sequence of their own, so that visits and first persons do not depend on the crowd.
     Random crowd_random(seed, kCrowdStream, visit);
     for (int i = 1; i < o.crowd; ++i) persons.push_back(makePerson(radar, t, until, crowd_random));
     t = until + mean_absence * random.uniform(0.5, 1.5);
@@ -140,7 +138,7 @@ std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o
   return persons;
 }
 
-// All that is needed to take a scan at one moment.
+// Takes scans at any moment of the motion.
 class Sensor {
  public:
   Sensor(const Motion& motion, const RadarSetup& setup, std::uint64_t seed)
@@ -150,7 +148,7 @@ class Sensor {
         scene_(makeScene(motion, seed, options_.points_mean)),
         persons_(makePersons(motion, options_, T_IR_, seed)) {}
 
-  // Each point is a ghost with the chance of `ghost_share`.
+  // Each point is a ghost with probability `ghost_share`.
   std::vector<SimulatedPoint> measure(double t, double ghost_share, Random& random) const {
     const Frame frame = frameAt(t);
     const int wanted = std::clamp(
@@ -215,7 +213,7 @@ class Sensor {
         }
       }
     }
-    // The few points of a single person are kept whatever the limit: bags of old seeds stay as they are.
+    // A single person may exceed the limit by a few points, so that bags of old seeds stay as they are.
     if (options_.crowd > 1 && echoes.size() > static_cast<std::size_t>(options_.points_max)) {
       keepStrongest(echoes, options_.points_max);
     }
@@ -228,10 +226,10 @@ class Sensor {
     if (wanted <= 0) return echoes;
     const Eigen::Quaterniond q_RW = frame.middle.q_WR.conjugate();
     const double reach2 = options_.max_range * options_.max_range;
-    constexpr double kRounding = 1e-3;  // [m] far more than there is
+    constexpr double kRounding = 1e-3;  // [m] far more than the rounding errors
     const double station_reach = options_.max_range + kSceneRadius + kRounding;
     for (const Station& station : scene_) {
-      // The radar sees no reflector of a station that is so far away.
+      // The radar sees no reflector of a station so far away.
       if ((station.p_W - frame.middle.p_W).head<2>().norm() > station_reach) continue;
       for (const Eigen::Vector3d& p_W : station.reflectors_W) {
         const Eigen::Vector3d d_W = p_W - frame.middle.p_W;
@@ -253,13 +251,13 @@ class Sensor {
     echoes.resize(kept);
   }
 
-  // What the sensor makes of a range rate [m/s].
+  // Returns the Doppler that the sensor reports for a range rate [m/s].
   double reported(double doppler) const {
     const double step = options_.doppler_step;
     const double span = options_.doppler_span;
     if (step <= 0.0) return span > 0.0 ? wrapped(doppler, span) : doppler;
     const double bin = std::round(doppler / step);
-    // In whole bins, so that a value next to the end of the span does not round out of it.
+    // Wraps whole bins, so that rounding does not move a value out of the span.
     return step * (span > 0.0 ? wrapped(bin, std::round(span / step)) : bin);
   }
 
@@ -286,7 +284,7 @@ class Sensor {
     return point;
   }
 
-  // Multipath and interference: where and how fast says nothing.
+  // Multipath and interference: position and Doppler are random.
   SimulatedPoint ghost(Random& random) const {
     SimulatedPoint point;
     point.position_R = anywhere(random.uniform(options_.min_range, options_.max_range), options_, random);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint64_t kNamedRadarStream = 30;
 
-// By the name alone, so that a radar measures the same whichever others there are. FNV-1a, since std::hash
+// The seed depends on the name alone, so that a radar does not depend on the others. FNV-1a, since std::hash
 // differs from library to library.
 std::uint64_t seedOf(const std::string& name, std::uint64_t seed) {
   std::uint64_t hash = 0xcbf29ce484222325u;

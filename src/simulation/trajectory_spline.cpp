@@ -135,13 +135,13 @@ std::vector<Vector7d> poseVectors(const Trajectory& poses) {
 
 }  // namespace
 
-TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options) {
+TrajectorySpline::TrajectorySpline(const Trajectory& poses, double cutoff) {
   // The penalty leaves parabolas free, which take three poses to fix; the fourth is one to smooth.
   if (poses.size() < 4) {
     throw std::invalid_argument("trajectory: " + std::to_string(poses.size()) +
                                 " poses, a spline needs four or more");
   }
-  if (!(options.cutoff > 0.0)) throw std::invalid_argument("spline: the cut-off frequency must be positive");
+  if (!(cutoff > 0.0)) throw std::invalid_argument("spline: the cut-off frequency must be positive");
   const std::vector<Vector7d> vectors = poseVectors(poses);
   duration_ = poses.back().time - poses.front().time;
   const int segments = std::max(1, static_cast<int>(std::ceil(duration_ / kKnotSpacing)));
@@ -156,7 +156,7 @@ TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptio
     coefficients_.middleCols<kOrder>(s.index) += vectors[i] * w.transpose();
   }
   const double pose_rate = static_cast<double>(poses.size() - 1) / duration_;
-  const double penalty = pose_rate / std::pow(2.0 * M_PI * options.cutoff, 6);
+  const double penalty = pose_rate / std::pow(2.0 * M_PI * cutoff, 6);
   const Eigen::Matrix<double, kOrder, kOrder> jerk = penalty * jerkProducts();
   for (int s = 0; s < segments; ++s) normal.add(s, jerk);
   normal.solve(coefficients_);

@@ -69,7 +69,6 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
 }
 
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
-  // Before the recording, so that a wrong path costs no time.
   if (fs::exists(keep)) throw rio_t::UsageError("--keep " + keep + ": expected a new file, this one exists");
   const rio_t::TemporaryFolder folder;
   const std::string bag = keep.empty() ? folder.path() + "/live.bag" : keep;

@@ -82,7 +82,7 @@ void check(const Arguments& arguments) {
 struct Comparison {
   const char* name;                  ///< for people
   const char* key;                   ///< for programs
-  const char* count_name = nullptr;  ///< none: the shape of the path does not allow this alignment
+  const char* count_name = nullptr;  ///< null: the path is too straight for this alignment
   std::size_t count = 0;
   Statistics metres = {}, degrees = {};
 };
@@ -211,7 +211,7 @@ std::string errorTable(const Trajectory& truth, const Trajectory& estimate, doub
 }
 
 void run(const Arguments& arguments) {
-  // All is computed before anything is written: a failure leaves no half output.
+  // Computes everything before it writes anything, so that a failure leaves no half output.
   std::vector<Evaluation> evaluations;
   std::string errors;
   if (!arguments.trajectories.empty()) {

@@ -22,7 +22,7 @@ const rio_t::ProgramText kText = {"rio_t_node", "[_config:=NAME_OR_PATH] [_KEY:=
                                   "Parameters are private; docs/parameters.md describes every key. "
                                   "docs/ros.md lists topics and services.\n"};
 
-/// ROS takes NAME:=VALUE for a topic that is renamed, and says nothing if there is none of that name.
+/// ROS takes NAME:=VALUE for the remapping of a topic, and ignores it silently if there is no such topic.
 void refuseParametersAsRemappings(int argc, char** argv) {
   std::vector<std::string> keys = {"config"};
   for (const rio_t::ParameterDescription& each : rio_t::parameterDescriptions()) keys.push_back(each.key);
@@ -34,11 +34,11 @@ void refuseParametersAsRemappings(int argc, char** argv) {
 }
 
 int spin() {
-  // Outside of try: the console goes with the last handle, and the message would be lost.
+  // Outside of try: rosconsole ends with the last handle, and would lose the message below.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");
-  // roscpp ends with an interrupt alone. Docker, systemd and kill send this: without an end in order the
-  // master keeps our topics and services.
+  // roscpp only handles SIGINT. Docker, systemd and kill send SIGTERM: without an orderly end, the master
+  // would keep our topics and services.
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   try {
     const rio_t::LiveOdometry odometry(node, private_node, ros::this_node::getName());

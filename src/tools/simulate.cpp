@@ -53,7 +53,7 @@ Motion motionFromFile(const Request& request) {
     const double wanted = Motion::pathDuration(request.duration, request.rest);
     while (!poses.empty() && poses.back().time - poses.front().time > wanted) poses.pop_back();
   }
-  return Motion(TrajectorySpline(poses, request.fit), request.rest);
+  return Motion(TrajectorySpline(poses, request.smoothing), request.rest);
 }
 
 Motion motionOf(const Request& request) {
@@ -143,11 +143,11 @@ void run(Request request) {
     const std::string fault = faultOfOutput(file, {request.trajectory});
     if (!fault.empty()) throw UsageError(name + fault);
   }
-  constexpr double kLastStamp = 4294967295.0;  // [s] ROS counts them in 32 bits
+  constexpr double kLastStamp = 4294967295.0;  // [s] ROS has 32 bits for the seconds
   if (request.start_time > kLastStamp)
     throw UsageError("--start-time " + shortText(request.start_time, 12) +
                      ": expected at most 4294967295, the last stamp of ROS");
-  // A message of time 0 no bag takes.
+  // A bag takes no message of time 0.
   const double record_start = request.start_time + request.bag.record_offset;
   if (!(record_start >= 1e-9 && record_start <= kLastStamp))
     throw UsageError("--record-offset " + shortText(request.bag.record_offset, 10) + " and --start-time " +

@@ -64,7 +64,7 @@ void addGeneralOptions(OptionSet& options, Request& r) {
   options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end);
   options.number("ramp", "S", "time from rest to full speed, and back", r.rest.ramp, NumberRange::kPositive);
   options.number("smoothing", "HZ",
-                 "with --trajectory: faster motion than this is taken for noise of the poses", r.fit.cutoff,
+                 "with --trajectory: faster motion than this is taken for noise of the poses", r.smoothing,
                  NumberRange::kPositive);
   options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, NumberRange::kPositive);
   options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset,
@@ -200,7 +200,7 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                  [&radar](const std::string& v) { radar.ghost_bursts.push_back(parseInterval(v)); });
 }
 
-/// The name of a radar, and the options that its text gives.
+/// Returns the name of a radar, and the options in its text.
 std::pair<std::string, OptionSet::Given> parseRadar(const std::string& text) {
   std::istringstream in(text);
   std::string name;
@@ -231,7 +231,7 @@ void addNamedRadars(OptionSet& options, Request& r) {
       });
 }
 
-/// `preset` with what is given; the first source that gives an option counts.
+/// Returns `preset` with what is given. If several sources give an option, the first counts.
 RadarSetup setupOf(const RadarSetup& preset, const std::vector<OptionSet::Given>& sources) {
   RadarRequest radar{preset};
   OptionSet options("");
@@ -256,7 +256,7 @@ CommandLine::CommandLine() : options_("What moves, and where it goes") {
 }
 
 const Request& CommandLine::read(const OptionSet::Given& given) {
-  // A preset says what the others are to change, so it comes first.
+  // The preset comes first, since the other options change it.
   OptionSet preset("");
   preset.value("preset", "NAME", "", "", [this](const std::string& name) {
     request_.preset = presetOf(name);

@@ -12,7 +12,7 @@
 
 namespace rio_t::simulation {
 
-/// The user asks for this on the command line of `simulate`.
+/// What the user asks for on the command line of `simulate`.
 struct Request {
   std::string motion;
   std::string trajectory;
@@ -20,28 +20,27 @@ struct Request {
   std::string ground_truth;
   double duration = 0.0;
   std::optional<double> speed;
-  Preset preset;  // what is moved unless --motion or --trajectory says so
+  Preset preset;  // gives the motion unless --motion or --trajectory does
   double ground_truth_file_rate = 400.0;
   double start_time = 1.7e9;
   bool noise_free = false;
   MotionRestOptions rest;
-  SplineFitOptions fit;
+  double smoothing = TrajectorySpline::kUsualCutoff;  // [Hz]
   SimulationOptions simulation;
   SimulationBagOptions bag;
   std::map<std::string, OptionSet::Given> radars;  // what --radar gives, by name
 };
 
-/// The options of one radar set this. --radar takes the same options.
+/// What the options of one radar set. --radar takes the same options.
 struct RadarRequest {
   RadarSetup setup;
   std::optional<double> fov_elevation = std::nullopt;
 };
 
-/// The options of `simulate`.
 class CommandLine {
  public:
   CommandLine();
-  CommandLine(const CommandLine&) = delete;  // the options name the members that they set
+  CommandLine(const CommandLine&) = delete;  // the options refer to the members that they set
   CommandLine& operator=(const CommandLine&) = delete;
 
   OptionSet& options() { return options_; }

@@ -20,14 +20,14 @@ struct BarometerModelOptions {
   };
   std::vector<Shock> shocks;  ///< doors, rotor wash; each rises and falls within 50 ms
 
-  /// No noise and no drift; what was asked for by its time, the shocks, stays.
+  /// Removes noise and drift. The shocks stay, since the user asked for each of them.
   void removeErrors();
 };
 
 struct SimulatedPressure {
   Time stamp;
   double pascal = 0.0;  ///< [Pa]
-  double drift = 0.0;   ///< [Pa] of that
+  double drift = 0.0;   ///< [Pa] part of `pascal`
 };
 
 /// Pressures of a barometer carried along `motion`, in the atmosphere of ISO 2533; empty unless enabled.

@@ -11,8 +11,8 @@
 
 namespace rio_t::simulation {
 
-/// The noise of an ADIS16448 as measured on a real bag. Fixed here, apart from the defaults of the estimator:
-/// what the estimator is configured to expect may be tuned, and the simulated world must not change with it.
+/// The noise of an ADIS16448, measured on a real bag. It is not the default of the estimator: tuning the
+/// estimator must not change the simulated world.
 inline ImuNoise measuredImuNoise() {
   ImuNoise noise;
   noise.accel_density = 2.4e-3;
@@ -24,10 +24,10 @@ inline ImuNoise measuredImuNoise() {
 
 struct ImuModelOptions {
   double rate = 409.0;  ///< [Hz]
-  /// a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample;
-  /// the scale of each axis of the gyro is drawn once
+  /// The noise of a sample is density * sqrt(rate). A bias walks by random_walk / sqrt(rate) a sample. The
+  /// scale of each axis of the gyro is drawn once.
   ImuNoise noise = measuredImuNoise();
-  /// Biases at the start; drawn from the sigmas where not given.
+  /// Biases at the start. If not given, they are drawn with the sigmas.
   std::optional<Eigen::Vector3d> accel_bias;  ///< [m/s^2]
   std::optional<Eigen::Vector3d> gyro_bias;   ///< [rad/s]
   double accel_bias_sigma = 0.05;             ///< [m/s^2] per axis
@@ -35,15 +35,16 @@ struct ImuModelOptions {
   double accel_saturation = 176.5;            ///< [m/s^2] per axis (18 g, ADIS16448)
   double gyro_saturation = 17.45;             ///< [rad/s] per axis (1000 deg/s)
   double gravity = 9.81;                      ///< [m/s^2]
-  /// What a vibrating frame adds to every sample, at rest too, each axis on its own. The radar feels nothing.
+  /// A vibrating frame adds this to every sample, also at rest, on each axis independently. The radar is not
+  /// affected.
   double accel_vibration = 0.0;  ///< [m/s^2] sigma per axis and sample
   double gyro_vibration = 0.0;   ///< [rad/s] sigma per axis and sample
-  /// [Hz] 0: white from sample to sample. Above: a line 0.6 Hz wide there, as a motor makes it; amplitude and
-  /// phase hold for half a second. Above half the rate it aliases: there is no filter.
+  /// [Hz] 0: white noise. Else a line 0.6 Hz wide at this frequency, as a motor makes it; amplitude and phase
+  /// hold for half a second. Above half the rate it aliases, since there is no filter.
   double vibration_frequency = 0.0;
-  double dropout_share = 0.0;  ///< of the samples but the first: taken, never delivered
+  double dropout_share = 0.0;  ///< share of the samples that are lost; never the first
 
-  /// No noise, no vibration, no bias and no lost samples; rate, saturation and gravity stay.
+  /// Removes noise, vibration, bias and lost samples. Rate, saturation and gravity stay.
   void removeErrors();
 };
 
@@ -54,8 +55,8 @@ struct ImuData {
   std::vector<Eigen::Vector3d> b_g;  ///< [rad/s]
 };
 
-/// Samples of an IMU carried along `motion`: values of the instant of their stamp, not averages over the
-/// interval. Stamps count from `start` (the start of the motion) and lie on whole nanoseconds. Throws
+/// Simulates an IMU on `motion`. The values are those at the stamp, not averages over the interval. The
+/// stamps count from `start` (the start of the motion) and lie on whole nanoseconds. Throws
 /// std::invalid_argument for options out of range.
 ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::uint64_t seed, Time start);
 

@@ -13,12 +13,12 @@ struct MotionRestOptions {
 
 /// A motion along a spline with rest at both ends.
 ///
-/// The path is the spline's; rest and ramps come from playing it at another pace: the path time s(t) stands
-/// still, speeds up to ds/dt = 1 and slows down again. ds/dt has three continuous derivatives, so the motion
-/// stays as smooth as the spline, and rest is exact.
+/// The motion follows the path of the spline, but at another pace: the path time s(t) stands still, speeds up
+/// to ds/dt = 1 and slows down again. ds/dt has three continuous derivatives, so the motion stays as smooth
+/// as the spline, and rest is exact.
 class Motion {
  public:
-  /// Throws std::invalid_argument for negative times or a spline shorter than the ramps take of it.
+  /// Throws std::invalid_argument for negative times, or for a spline that is too short for the ramps.
   Motion(TrajectorySpline path, const MotionRestOptions& rest);
 
   /// Seconds from the first moment of rest to the last.

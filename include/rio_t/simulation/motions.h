@@ -15,7 +15,6 @@ struct MotionDescription {
   double default_duration;  ///< [s], rest included
 };
 
-/// The built-in motions.
 const std::vector<MotionDescription>& builtInMotions();
 
 struct MotionRequest {

@@ -17,7 +17,6 @@ struct Preset {
   SimulationOptions options;  ///< IMU, radars and mountings; seed, start and time offset are the defaults
 };
 
-/// The known presets.
 std::vector<Preset> presets();
 
 /// Throws std::invalid_argument for an unknown name; the message lists the known ones.

@@ -33,21 +33,21 @@ struct TimeOffsetProfile {
 struct RadarModelOptions {
   double rate = 10.0;           ///< [Hz] of triggers
   double first_trigger = 0.05;  ///< [s] from the start of the bag: radars of one rate need not be in phase
-  /// [s] The Doppler is the mean over it, centred at the measurement; 0 = an instant.
+  /// [s] The Doppler is the mean over this time, centred at the measurement; 0 = an instant.
   double frame_length = 0.0;
   double latency = 0.06;       ///< [s] from stamp to arrival (record time)
-  double latency_sigma = 0.0;  ///< [s] scatter of it; never arrives before the stamp
+  double latency_sigma = 0.0;  ///< [s] scatter of the latency; no scan arrives before its stamp
 
   double points_mean = 43.0;    ///< points a scan
   double points_sigma = 8.0;    ///< their scatter
-  int points_min = 1;           ///< fewest wanted; a scan has fewer where fewer things are in view
+  int points_min = 1;           ///< fewest wanted; a scan has fewer if fewer things are in view
   int points_max = 70;          ///< the sensor's limit
-  bool publish_empty = true;    ///< scans without points; else they are not delivered, as by some drivers
+  bool publish_empty = true;    ///< false: scans without points are not delivered, as by some drivers
   double min_range = 0.25;      ///< [m]
   double max_range = 12.0;      ///< [m]
   double fov_azimuth = 60.0;    ///< [deg] half angle
   double fov_elevation = 45.0;  ///< [deg] half angle
-  /// A flat radar, false, has one row of antennas: it sees what is within `fov_elevation`, measures range and
+  /// false: a flat radar with one row of antennas. It sees what is within `fov_elevation`, measures range and
   /// the angle to that row, and reports all points in its plane, z = 0.
   bool measures_elevation = true;
 
@@ -60,12 +60,12 @@ struct RadarModelOptions {
   /// whole spans away from its true value; 0 = unlimited
   double doppler_span = 0.0;
 
-  double ghost_share = 0.03;  ///< of the points: anywhere, any Doppler
+  double ghost_share = 0.03;  ///< share of the points that are ghosts: anywhere, any Doppler
   /// Share of the points that the radar reports at a second direction, too: same range, Doppler and SNR.
   double ambiguous_share = 0.0;
-  double moving_share = 0.10;  ///< of the time: walking persons in view
-  int crowd = 1;               ///< so many at once; their points take the place of the room's
-  double dropout_share = 0.0;  ///< of the scans: triggered, never delivered
+  double moving_share = 0.10;  ///< share of the time in which persons walk in view
+  int crowd = 1;               ///< persons at once; their points replace those of the room
+  double dropout_share = 0.0;  ///< share of the scans that are triggered but lost
   struct Interval {
     double start;     ///< [s] from the start of the bag
     double duration;  ///< [s]
@@ -73,13 +73,13 @@ struct RadarModelOptions {
   std::vector<Interval> blackouts;     ///< no scan with a stamp inside is delivered
   std::vector<Interval> ghost_bursts;  ///< all points of a scan with a stamp inside are ghosts
 
-  /// Exact points of static reflectors only, every scan delivered. What was asked for by its time stays:
-  /// blackouts and bursts of ghosts. So does what the sensor cannot see or tell apart: field of view,
-  /// elevation, Doppler span.
+  /// Leaves exact points of static reflectors, and delivers every scan. Blackouts and bursts of ghosts stay,
+  /// since the user asked for each of them. The limits of the sensor also stay: field of view, elevation,
+  /// Doppler span.
   void removeErrors();
 };
 
-/// A radar on the rig: what it is, how late its stamps are, where it sits.
+/// A radar on the rig: its model, the offset of its stamps, and its mounting.
 struct RadarSetup {
   RadarModelOptions radar;
   TimeOffsetProfile time_offset;
@@ -112,13 +112,13 @@ struct Station {
   std::vector<Eigen::Vector3d> reflectors_W;
 };
 
-/// Reflectors around the path of `motion`, within radar range wherever the path leads, and dense enough for
-/// `points_mean` points a scan.
+/// Makes reflectors around the path of `motion`: within radar range everywhere, and enough for `points_mean`
+/// points a scan.
 std::vector<Station> makeScene(const Motion& motion, std::uint64_t seed, double points_mean);
 
-/// Scans of a radar carried along `motion`; scans whose measurement time is not inside the motion are left
-/// out. Each scan draws from a sequence of its own, so that a lost scan leaves the others as they are. Throws
-/// std::invalid_argument for options out of range.
+/// Simulates a radar on `motion`. Leaves out scans that are measured outside the motion. Each scan draws from
+/// a sequence of its own, so that a lost scan does not change the others. Throws std::invalid_argument for
+/// options out of range.
 std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
                                          Time start);
 

@@ -10,8 +10,8 @@ namespace rio_t::simulation {
 /// seeded by SplitMix64.
 class Random {
  public:
-  /// `stream` and `index` pick independent sequences under one seed, so that what one part of the simulation
-  /// draws does not shift what another one gets.
+  /// `stream` and `index` pick independent sequences under one seed. So the draws of one part of the
+  /// simulation do not shift those of another.
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0, std::uint64_t index = 0);
 
   std::uint64_t bits();

@@ -7,13 +7,13 @@
 
 namespace rio_t::simulation {
 
-/// All samples of a simulation are in memory, about 200 bytes each: these take 20 GB.
+/// A simulation keeps all samples in memory, about 200 bytes each. So many take 20 GB.
 constexpr double kMostSamples = 1e8;
 /// [s] Built-in motions have 100 poses a second.
 constexpr double kLongest = 0.01 * kMostSamples;
 
-/// Throws std::invalid_argument if `rate` [Hz] gives more samples than these in `duration` [s]. `option`:
-/// the rate, as on the command line.
+/// Throws std::invalid_argument if `rate` [Hz] gives more than kMostSamples in `duration` [s]. `option`: of
+/// the rate, on the command line.
 inline void checkSampleCount(const char* option, double rate, double duration) {
   if (rate * duration <= kMostSamples) return;
   throw std::invalid_argument(

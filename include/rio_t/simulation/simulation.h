@@ -10,13 +10,14 @@
 
 namespace rio_t::simulation {
 
-/// A rig with one radar, the RadarSetup it is itself, unless `radars` names several.
+/// A rig. Its one radar is the base RadarSetup, unless `radars` names several.
 struct SimulationOptions : RadarSetup {
   std::uint64_t seed = 0;
   Time start = Time::fromNanoseconds(1'700'000'000'000'000'000);  ///< stamp of the first IMU sample
   ImuModelOptions imu;
   BarometerModelOptions barometer;
-  /// By name: lower case letters, digits and underscores. If there are any, they are all radars of the rig.
+  /// By name: lower case letters, digits and underscores. If it is not empty, these are all radars of the
+  /// rig.
   std::map<std::string, RadarSetup> radars;
 };
 
@@ -28,10 +29,10 @@ struct SensorData {
   std::map<std::string, std::vector<SimulatedScan>> radars;  ///< of those with names
 };
 
-/// The same motion and options give the same data, bit for bit. Radars with names draw from sequences of
-/// their own, picked by seed and name: what one of them measures does not depend on the others, nor does
-/// the IMU on any. Each has reflectors, persons and ghosts of its own.
-/// Throws std::invalid_argument for options out of range; the message names the radar.
+/// The same motion and options give the same data, bit for bit. Each radar with a name has reflectors,
+/// persons and ghosts of its own. Seed and name pick its sequence, so it does not depend on the other radars,
+/// nor does the IMU depend on any. Throws std::invalid_argument for options out of range; the message names
+/// the radar.
 SensorData simulate(const Motion& motion, const SimulationOptions& options);
 
 /// True poses at `rate` [Hz] from the start to the end.

@@ -16,11 +16,6 @@ struct MotionState {
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< angular velocity of I against W, in I [rad/s]
 };
 
-struct SplineFitOptions {
-  /// Half-power frequency of the smoothing [Hz]: faster motion, as motion-capture noise, does not pass.
-  double cutoff = 5.0;
-};
-
 /// A smooth motion through the poses of a trajectory.
 ///
 /// Position and quaternion are one uniform B-spline of degree 5 in R^7; the quaternion is normalised where it
@@ -31,17 +26,19 @@ struct SplineFitOptions {
 class TrajectorySpline {
  public:
   static constexpr double kKnotSpacing = 0.05;  ///< [s]
+  static constexpr double kUsualCutoff = 5.0;   ///< [Hz]
 
-  /// Throws std::invalid_argument for fewer than four poses, stamps that do not increase, a cutoff that is
-  /// not positive, or neighbouring poses more than 90 degrees apart.
-  explicit TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options = SplineFitOptions{});
+  /// `cutoff`: half-power frequency of the smoothing [Hz]. It removes faster motion, such as the noise of
+  /// motion capture. Throws std::invalid_argument for fewer than four poses, stamps that do not increase, a
+  /// cutoff that is not positive, or neighbouring poses more than 90 degrees apart.
+  explicit TrajectorySpline(const Trajectory& poses, double cutoff = kUsualCutoff);
 
   /// Seconds from the first to the last pose.
   double duration() const { return duration_; }
   /// At `t` seconds after the first pose, 0 <= t <= duration (1 us of grace); else throws std::out_of_range.
   MotionState at(double t) const;
 
-  /// RMS distance of the given poses from the spline: what the smoothing took away.
+  /// RMS distance of the given poses from the spline.
   double positionResidual() const { return position_residual_; }  ///< [m]
   double rotationResidual() const { return rotation_residual_; }  ///< [rad]
 
