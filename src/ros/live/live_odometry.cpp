@@ -353,7 +353,7 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
     std::size_t stride = 1;
     const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
     if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
-    // With its folder, since who calls may not know where the node runs.
+    // With its folder, since the caller may not know where the node runs.
     const std::string file = std::filesystem::absolute(config_.trajectory_file).string();
     if (const std::string fault = faultOfOutput(file, {}); !fault.empty()) throw std::runtime_error(fault);
     writeTum(file, trajectory);

@@ -28,8 +28,8 @@ void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
 
 }  // namespace
 
-// Queues are deep where a message stands for itself (seconds of odometry survive a busy subscriber), shallow
-// where the newest tells all.
+// Queues are deep if each message counts (seconds of odometry survive a busy subscriber), and shallow if only
+// the newest counts.
 LivePublisher::Radar::Radar(const Config& config, const ros::NodeHandle& private_node)
     : frame(config.radar_frame) {
   ros::NodeHandle node(private_node, config.radar_name);  // without a name, the same
@@ -52,7 +52,7 @@ LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& privat
   ros::NodeHandle node = private_node;
   odom_ = node.advertise<nav_msgs::Odometry>("odom", 2000);
   odom_optimized_ = node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
-  // Not latched: that would serialise the whole path with each scan. Who comes late gets it at once.
+  // Not latched: that would serialise the whole path with each scan. A late subscriber gets the path at once.
   path_ = node.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher& subscriber) {
     const nav_msgs::Path so_far = path();
     if (!so_far.poses.empty()) subscriber.publish(so_far);

@@ -20,8 +20,8 @@ class LiveLog {
   /// `name`: of the node, at the beginning of each line.
   explicit LiveLog(std::string name) : name_(std::move(name)) {}
 
-  /// Logs `text` if no line of this kind came within `period` [s]; returns whether it did. Each radar can
-  /// have a kind, and so a turn, of its own, unlike with ROS's throttles.
+  /// Logs `text` if no line of this kind came within `period` [s]; returns whether it did. Unlike ROS's
+  /// throttles, each radar can have a kind of its own.
   bool warn(const std::string& kind, const std::string& text, double period = kPeriod);
   bool error(const std::string& kind, const std::string& text, double period = kPeriod);
 

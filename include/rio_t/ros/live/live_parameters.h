@@ -26,8 +26,7 @@ class LiveParameters {
   /// ConfigError if a message had other keys.
   ParameterEntries changesFrom(const Config& config) const;
 
-  // The server calls these; it sets their names.
-  // NOLINTBEGIN(bugprone-reserved-identifier)
+  // The server calls these and prescribes their names.
   static dynamic_reconfigure::ConfigDescription __getDescriptionMessage__();
   static LiveParameters __getDefault__() { return {}; }
   static LiveParameters __getMin__() { return endsOfRanges(false); }

@@ -44,10 +44,10 @@ class PublishRate {
   double last_ = std::numeric_limits<double>::quiet_NaN();  ///< period of the last message; NaN equals none
 };
 
-/// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` and
-/// `clear` to the optimisation thread, `tune` to any. Topics of one radar are in its name's namespace, if
-/// the radars have names. Messages go out as shared pointers, so that subscribers in the same nodelet manager
-/// get them without a copy; nobody changes a message after it was published.
+/// Publishes the messages of the live node. `odometry` belongs to the IMU thread, `result` and `clear` to the
+/// optimisation thread, `tune` to any. If the radars have names, the topics of a radar are in the namespace
+/// of its name. Messages go out as shared pointers, so that subscribers in the same nodelet manager get them
+/// without a copy; nobody changes a message after it was published.
 class LivePublisher {
  public:
   /// `private_node` carries the callback queue that serves new subscribers of ~path.

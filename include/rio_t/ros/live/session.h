@@ -22,9 +22,9 @@
 
 namespace rio_t {
 
-/// Whether the motion of the last second tells the time offset: its scans alone, without what was known
-/// before, would give the offset to kMaxSigma. At constant velocity they do not, however small the
-/// estimate's own sigma.
+/// Whether the motion of the last second shows the time offset: its scans alone, without earlier knowledge,
+/// would give the offset to kMaxSigma. At constant velocity they do not, even if the sigma of the estimate is
+/// small.
 class OffsetObservability {
  public:
   void add(const ScanResult& result);
@@ -64,10 +64,11 @@ class BoundedTrajectory {
   StampedPose last_;
 };
 
-/// All that one run of the estimator remembers. A reset takes a new one, so nothing of the old can leak into
-/// it.
+/// The state of one run of the estimator. A reset makes a new session, so that nothing of the old one leaks
+/// into it.
 ///
-/// Three threads meet here: the one of the IMU, the one of radar and triggers, and the one that optimises.
+/// Three threads meet here: the IMU thread, the input thread (radars and triggers), and the optimisation
+/// thread.
 class LiveSession {
  public:
   using Clock = std::chrono::steady_clock;
@@ -86,8 +87,8 @@ class LiveSession {
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
   /// Any thread.
   void addPressure(const Pressure& pressure) { odometry_.addPressure(pressure); }
-  /// The optimisation thread has taken none of the last `kMaxWaitingImu` samples: it must be stuck, and what
-  /// waits for it would grow without end. Any thread.
+  /// Whether the optimisation thread has taken none of the last `kMaxWaitingImu` samples. It must be stuck,
+  /// and the waiting samples would grow without bound. Any thread.
   bool imuPilesUp() const { return waiting_imu_ >= kMaxWaitingImu; }
   static constexpr std::size_t kMaxWaitingImu = 20000;  ///< 49 s at 409 Hz
   /// White noise of one gyro sample [rad/s], from its density and the rate seen so far. Any thread.
@@ -100,7 +101,7 @@ class LiveSession {
   /// The stamp of `scan` is not read.
   std::vector<GivenUp> addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
 
-  /// A result with what goes with it.
+  /// A result of the estimator, and what the topics need besides.
   struct Result {
     ScanResult result;
     bool offset_observable = false;
@@ -114,8 +115,8 @@ class LiveSession {
   /// whether there may be another.
   std::vector<Result> process(bool* more);
 
-  /// Optimised poses so far, those that left the window, and the newest. Of more than `kMaxPoses`, one in so
-  /// many is kept: `stride` says of how many.
+  /// Returns the optimised poses so far: those that left the window, and the newest. Of more than
+  /// `kMaxPoses`, only one in `stride` is kept.
   Trajectory trajectory(std::size_t* stride = nullptr) const;
   static constexpr std::size_t kMaxPoses = 36000;  ///< an hour at 10 Hz, 3 MB
   const RadarInertialOdometry& odometry() const { return odometry_; }
@@ -166,8 +167,7 @@ class LiveSession {
   std::optional<StampedPose> newest_;
 };
 
-/// Which session of the live node is the current one, and the promise that nothing of an old one is said once
-/// it has been replaced. Thread-safe.
+/// Holds the current session of the live node. Once it is replaced, nothing of it is published. Thread-safe.
 class CurrentSession {
  public:
   using Session = std::shared_ptr<LiveSession>;
@@ -180,15 +180,15 @@ class CurrentSession {
     return session_;
   }
 
-  /// Waits for those who are speaking; after it no one speaks for the old session, which is returned. Not to
-  /// be called by a speaker while it speaks.
+  /// Replaces the session and returns the old one. Waits for those who publish; afterwards nobody publishes
+  /// for the old session. It must not be called from within speak().
   Session replace(Session fresh) {
     const std::scoped_lock lock(speaking_[0], speaking_[1], mutex_);
     std::swap(session_, fresh);
     return fresh;
   }
 
-  /// Calls say() if `session` still is the current one, which it then stays until say() returns; else false.
+  /// Calls say() if `session` is the current one, which it stays until say() returns. Returns whether it was.
   template <typename Say>
   bool speak(Speaker speaker, const Session& session, Say&& say) {
     const std::lock_guard<std::mutex> lock(speaking_[static_cast<std::size_t>(speaker)]);

@@ -15,7 +15,7 @@
 
 namespace rio_t {
 
-/// Watches tf for others who say where our frames are. A frame of tf has one parent. With two publishers the
+/// Watches tf for other nodes that place our frames. A frame of tf has one parent. With two publishers the
 /// frame jumps between their answers, and tf tells nobody. Thread-safe.
 class TfWatch {
  public:
@@ -48,7 +48,7 @@ class TfWatch {
   };
   std::map<std::pair<std::string, std::string>, Other> others_;  ///< by frame and name of the node
   std::uint64_t heard_ = 0;                                      ///< tf of the body under our name
-  std::uint64_t too_many_ = 0;  ///< by how many it was more than we had sent, at most
+  std::uint64_t too_many_ = 0;  ///< how many more we have heard than sent, at most
   ros::Subscriber tf_, tf_static_;
 };
 
