@@ -12,7 +12,7 @@ def package_folder():
 
 
 def version():
-    """That of package.xml."""
+    """The version in package.xml."""
     folder = package_folder()
     return ElementTree.parse(folder / "package.xml").findtext("version") if folder else "unknown"
 

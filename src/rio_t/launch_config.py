@@ -2,8 +2,8 @@
 
 Prints the configuration that the argument `config` names, and refuses arguments that the launch file does not have:
 roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word.
-It also refuses a configuration that is not there, since the node would end and roslaunch would go on, and a bag that is
-not there or a speed that is none, since the player would end and the node would wait for it for ever."""
+It also refuses a configuration that does not exist: the node would end, and roslaunch would go on. And it refuses a bag
+that does not exist, and a number that rosbag play does not take: the player would end, and the node would wait for ever."""
 import argparse
 import difflib
 import math
@@ -17,7 +17,7 @@ from .errors import RioTError
 
 
 def config_path(name, folder, package_configs):
-    """What the node shall read: an absolute path for a file, counted from `folder`; a name of the package's as it is."""
+    """The configuration for the node: an absolute path (a relative `name` counts from `folder`), or a name of the package's."""
     path = pathlib.Path(folder, os.path.expanduser(name))
     if path.is_file():
         return str(path.resolve())

@@ -1,4 +1,4 @@
-"""Starts the live node or nodelet, plays bags to it and collects what it says. Waits on conditions, with deadlines."""
+"""Starts the live node or nodelet, plays bags to it and collects its messages. Waits on conditions, with deadlines."""
 import os
 import shutil
 import subprocess
@@ -20,7 +20,7 @@ from .msg import ImuBias, TimeOffset
 from .paced_player import PacedPlayer
 from .ros_processes import DEADLINE, SLOWNESS, Process, program, wait_for
 
-# A library that programs of others need first, before they can load ours: the runtime of a sanitizer.
+# The runtime of a sanitizer. Programs of others must load it before our library.
 PRELOAD = os.environ.get("RIO_T_TEST_PRELOAD", "")
 IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
 # The messages that rosbag play keeps for a late subscriber. The default is 100, which is an eighth of a second of IMU.
@@ -32,7 +32,7 @@ TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffse
 
 
 def preloaded():
-    """Words that start another's program which will load our nodelet."""
+    """Words before a program of others that loads our nodelet."""
     return ["env", "LD_PRELOAD=" + PRELOAD] if PRELOAD else []
 
 
@@ -102,7 +102,7 @@ class Listener:
             self._changed.notify_all()
 
     def wake(self):
-        """All who wait look at their conditions again."""
+        """Lets all who wait check their conditions again."""
         with self._changed:
             self._changed.notify_all()
 
@@ -129,14 +129,14 @@ class Listener:
         return next((v.value for v in status.values if v.key == key), None) if status else None
 
     def wait_until_heard(self):
-        """All publishers of the node are connected to us: nothing will be missed."""
+        """Waits until all publishers of the node are connected, so that no message is missed."""
         names = [f"{self.node}/{name}" for name in self.messages]
         wait_for("subscribers of all of " + " ".join(names),  # rospy tells no one of new connections
                  lambda: all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names))
 
 
 def check(outcome):
-    """Raises what a program said if it failed."""
+    """Raises AssertionError with the output of a program if it failed."""
     if outcome.returncode != 0:
         raise AssertionError(f"{outcome.args}: {outcome.stdout}")
 

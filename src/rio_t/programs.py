@@ -8,7 +8,7 @@ import tempfile
 from .errors import RioTError
 
 
-# Exit status of a program that has a result. The result of the latter is not to be trusted, which summary.yaml says.
+# Exit statuses of a program that has a result. NOT_TRUSTED: summary.yaml says why not to trust it.
 OK, NOT_TRUSTED = HAS_RESULT = (0, 3)
 
 
@@ -33,7 +33,7 @@ def is_program(path):
 
 
 def run(*words, **options):
-    """The completed process, with what it told as text."""
+    """The completed process, with its output as text."""
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
     return subprocess.run([str(word) for word in words], text=True, check=False, **options)
 
@@ -58,13 +58,13 @@ def usage_of(*words):
 
 
 def cpu_seconds_of(*words):
-    """CPU [s], user and system, of a program that has a result: what it takes with others beside it, too."""
+    """CPU time [s], user and system, of a program that has a result. Other programs beside it do not count."""
     usage = usage_of(*words)
     return usage.ru_utime + usage.ru_stime
 
 
 def output_of(*words):
-    """What a program that has a result tells on stdout."""
+    """The stdout of a program that has a result."""
     done = run(*words)
     if done.returncode not in HAS_RESULT:
         raise RioTError(done.stderr.strip() or f"{words[0]} ended with status {done.returncode}")

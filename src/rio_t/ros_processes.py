@@ -21,8 +21,8 @@ def program(package, name):
 
 
 class Process:
-    """A process that ends with the `with` block, and is asked to before it is made to. A block without an exception
-    raises one if the process crashed, or failed before it was asked to end. `clean`: also if its status is not 0."""
+    """A process that ends with the `with` block: by an interrupt, or killed if it does not end. Then raises RioTError if it
+    crashed, or failed before the interrupt; with `clean`, after any status but 0."""
 
     def __init__(self, *words, clean=False, **options):
         self.process = subprocess.Popen([str(word) for word in words], start_new_session=True, **options)
@@ -41,7 +41,7 @@ class Process:
         return self.process.wait(DEADLINE)
 
     def kill(self):
-        """As a crash would end it, which is then no fault."""
+        """Ends it as a crash would. This is no fault."""
         self._killed = True
         os.killpg(self.process.pid, signal.SIGKILL)
         self.wait()
@@ -59,7 +59,7 @@ class Process:
 
 
 def quiet(*words):
-    """A Process that reads nothing and says nothing but errors."""
+    """A Process without input and output, except for errors."""
     return Process(*words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
 

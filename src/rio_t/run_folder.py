@@ -48,13 +48,13 @@ def read_table(path, header):
 
 
 def of_radar(name, radar):
-    """What a file, or a key of summary.yaml, is called for that radar: `radar` is empty if there is but one."""
+    """The name of a file, or of a key of summary.yaml, of a radar; `radar` is empty if there is only one."""
     stem, dot, extension = name.partition(".")
     return f"{stem}_{radar}{dot}{extension}" if radar else name
 
 
 def read(folder, name, radar=""):
-    """A table of the run, by the name of its file without that of the radar."""
+    """A table of the run. `name`: of its file, without the name of the radar."""
     return read_table(folder / of_radar(name, radar), COLUMNS[name])
 
 
@@ -69,8 +69,8 @@ def read_yaml(path):
 
 
 def starts_again(summary):
-    """The clock of the IMU jumped while the estimate ran: what comes afterwards has a world of its own. Of such a
-    trajectory rio_t_bag tells no way from end to start, and no error."""
+    """Whether the trajectory starts again in a new world, since the clock of the IMU jumped while the estimate ran. Its
+    summary has no distance from end to start, and no error."""
     return "imu_clock_restart" in (summary.get("input_faults") or {}) and "end_to_start_3d_m" not in summary
 
 

@@ -40,7 +40,7 @@ class Source:
 
 @dataclasses.dataclass
 class Run:
-    """What is kept of one run of rio_t_bag. Times of offsets in ms."""
+    """One run of rio_t_bag. Offsets and sigmas in ms."""
     offset: float
     sigma: float
     summary: dict
@@ -109,9 +109,9 @@ class Laboratory:
                 self.progress.update()
 
     def map(self, work):
-        """Results, in order, of `work`: (source, count of runs, function of lab and bag). Side by side; a simulated
-        bag is made for the first that wants it and removed after the last. Raises if none has more than a line why there
-        is none."""
+        """Runs `work`, a list of (source, count of runs, function of lab and bag), side by side. Returns the results in
+        order. A simulated bag is made for its first user and removed after its last. Raises RioTError if no run has a
+        result."""
         for source, _, _ in work:
             source.users += 1
 

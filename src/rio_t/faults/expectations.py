@@ -1,4 +1,4 @@
-"""What must happen in a faulty run. Each expectation says itself in words, and tells what of it did not hold."""
+"""What must happen in a faulty run. Each expectation describes itself in words, and reports what did not hold."""
 import dataclasses
 import re
 
@@ -7,11 +7,11 @@ import numpy
 from .. import programs
 
 RECOVERY = 5.0             # [s] after the end of a fault everything must be as without it
-# Times the velocity error of the fault-free run, plus [m/s]; against the fault-free run itself, from which an estimate
-# with another history differs by the noise of both.
+# Bound on the velocity error after the recovery: a factor on the error of the fault-free run, and an allowance [m/s].
+# Without truth the fault-free run is the reference, and the two estimates differ by the noise of both.
 RECOVERED, RECOVERED_WITHOUT_TRUTH = (1.5, 0.05), (1.5, 0.10)
-# Standard deviations. Without truth twice: the real bag's calibration is 3.5 degrees off, so with radar and without, the
-# estimate follows two worlds that contradict each other by more than either admits.
+# Largest error in standard deviations. Without truth it is twice as large: the calibration of the real bag is 3.5 degrees
+# off, so an estimate with radar and one without contradict each other by more than their sigmas.
 HONEST, HONEST_WITHOUT_TRUTH = 4.0, 8.0
 SILENCE = 0.5              # [s] that the output may end before the IMU does
 
@@ -47,7 +47,7 @@ class Survives:
         """(what happened, [what of it is wrong])"""
         if outcome.status not in programs.HAS_RESULT:
             return f"exit status {outcome.status}: {first_line(outcome.messages)}", ["does not run"]
-        wrong, happened = list(common(outcome)), []
+        wrong, happened = list(faults_of_result(outcome)), []
         errors = outcome.errors
         if errors is None:
             return "no output", wrong + ["no output"]
@@ -73,9 +73,8 @@ class Survives:
             if grown < self.grows:
                 wrong.append(f"sigma grew {grown:.1f} times only")
         if end + RECOVERY < outcome.length:
-            rms = lambda part: numpy.sqrt(numpy.mean(numpy.square(part.velocity))) if len(part.time) else numpy.nan
-            recovered = rms(errors.part(end + RECOVERY, numpy.inf))
-            usual = rms(outcome.reference.part(end + RECOVERY, numpy.inf)) if outcome.reference is not None else 0.0
+            recovered = velocity_rms(errors.part(end + RECOVERY, numpy.inf))
+            usual = velocity_rms(outcome.reference.part(end + RECOVERY, numpy.inf)) if outcome.reference is not None else 0.0
             happened.append(f"then {recovered:.3f} m/s")
             factor, allowance = RECOVERED if outcome.has_truth else RECOVERED_WITHOUT_TRUTH
             if not recovered <= factor * usual + allowance:
@@ -120,20 +119,24 @@ class RefusesOrReports:
     def judge(self, outcome, begin, end):
         if outcome.status not in programs.HAS_RESULT:
             return Refuses(self.message).judge(outcome, begin, end)
-        wrong = list(common(outcome))
+        wrong = list(faults_of_result(outcome))
         count = outcome.counted().get(self.counted, 0)
         if not count:
             wrong.append("an estimate from such input, without a word")
         return f"{self.counted} {count}", wrong
 
 
+def velocity_rms(errors):
+    return numpy.sqrt(numpy.mean(numpy.square(errors.velocity))) if len(errors.time) else numpy.nan
+
+
 def first_line(text):
-    """What went wrong; the likely causes stand below it."""
+    """The line that says what went wrong; the likely causes follow it."""
     return text.strip().partition("\n")[0]
 
 
-def common(outcome):
-    """What holds for every run that ends well."""
+def faults_of_result(outcome):
+    """Faults that no run with a result may have."""
     if outcome.not_a_number:
         yield "nan or inf in " + ", ".join(outcome.not_a_number)
     summary = outcome.summary

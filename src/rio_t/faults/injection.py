@@ -1,4 +1,4 @@
-"""The faults: each takes the messages of a bag and gives them back with the fault in it.
+"""The faults: each takes the messages of a bag and returns them with the fault in it.
 
 `Site` says where: `begin` and `end` of the fault in seconds after the first message, as recorded. Faults that are drawn
 take `site.random`, which starts anew for each case, so that a case is the same in every run.
@@ -31,7 +31,7 @@ def nanoseconds(seconds):
 
 
 def edit(messages, kind, where, change):
-    """`change(copy)` for each message of `kind` that `where(message)` tells."""
+    """Calls `change(copy)` for each message of `kind` for which `where(message)` holds."""
     result = []
     for message in messages:
         if message.kind == kind and where(message):
@@ -54,12 +54,12 @@ def doppler_field(points):
 
 
 def edit_points(messages, site, change):
-    """`change(points)` gives the points of each scan that the fault covers."""
+    """Replaces the points of each scan that the fault covers by `change(points)`."""
     return edit(messages, "radar", site.covers, lambda m: m.set_points(change(m.points())))
 
 
 def edit_imu(messages, site, accel=None, gyro=None):
-    """`accel` and `gyro` give the vectors of each sample that the fault covers."""
+    """Replaces the vectors of each sample that the fault covers by `accel(vector)` and `gyro(vector)`."""
     def change(message):
         for of, function in ((message.content.linear_acceleration, accel), (message.content.angular_velocity, gyro)):
             if function:
@@ -134,17 +134,18 @@ def outliers(share):
     return lambda messages, site: edit_points(messages, site, lambda p: spoil(p, site))
 
 
-def half_the_view_moves(velocity=(1.2, 0.8, 0.0)):
-    """All that is seen on one side, half of the points, moves as one with `velocity` [m/s], e.g. a train."""
-    def spoil(points, site):
+def half_the_view_moves(messages, site):
+    """All that is seen on one side, half of the points, moves as one, e.g. a train."""
+    velocity = numpy.array((1.2, 0.8, 0.0))  # [m/s]
+    def spoil(points):
         xyz = numpy.stack([points[a] for a in "xyz"], axis=1).astype(float)
         direction = xyz / numpy.maximum(numpy.linalg.norm(xyz, axis=1), 1e-6)[:, None]
         # Sideways is the axis along which the points scatter to both sides of zero.
         side = min((0, 1), key=lambda a: abs(numpy.median(direction[:, a])))
         moving = direction[:, side] > numpy.median(direction[:, side])
-        points[doppler_field(points)][moving] += (direction @ numpy.array(velocity))[moving]
+        points[doppler_field(points)][moving] += (direction @ velocity)[moving]
         return points
-    return lambda messages, site: edit_points(messages, site, lambda p: spoil(p, site))
+    return edit_points(messages, site, spoil)
 
 
 def all_ghosts(messages, site):
@@ -163,7 +164,7 @@ def all_ghosts(messages, site):
 
 
 def edit_stamps(kinds, every, stamp):
-    """`stamp(message)` for every nth message of these kinds."""
+    """Sets the stamp of every nth message of these kinds to `stamp(message)`."""
     def inject(messages, site):
         for kind in kinds:
             count = itertools.count()
@@ -243,21 +244,22 @@ def imu_stamps_repeated(messages, site):
     return edit(messages, "imu", site.covers, repeat)
 
 
-def axis_freezes(sensor, axis=0):
-    """An axis of the gyro or the accelerometer stays at the reading that it has when the fault begins."""
+def axis_freezes(sensor):
+    """The x axis of "gyro" or "accel" stays at the reading that it has when the fault begins."""
     def inject(messages, site):
         frozen = []
         def freeze(of):
-            frozen.append(of[axis])
-            of[axis] = frozen[0]
+            frozen.append(of[0])
+            of[0] = frozen[0]
             return of
         return edit_imu(messages, site, **{sensor: freeze})
     return inject
 
 
-def imu_saturated(accel=False, gyro=False, share=0.6):
-    """Readings of all axes end at that share of what the motion of this bag reaches in a hundredth of the time; the
-    accelerometer's beyond gravity, on the axis that is upright at rest."""
+def imu_saturated(accel=False, gyro=False):
+    """The range of all axes ends at 0.6 of what the motion of this bag exceeds in a hundredth of the time. For the
+    accelerometer, this is the motion beyond gravity, on the axis that is upright at rest."""
+    share = 0.6
     def inject(messages, site):
         samples = [m for m in messages if m.kind == "imu"]
         accels = numpy.array([vector(m.content.linear_acceleration) for m in samples])
@@ -281,11 +283,6 @@ def imu_turned(matrix):
     return lambda messages, site: edit_imu(messages, site, lambda a: turn @ a, lambda w: turn @ w)
 
 
-def imu_gravity_flipped(messages, site):
-    """The accelerometer gives gravity instead of the specific force: minus what is expected."""
-    return imu_scaled(accel=-1.0)(messages, site)
-
-
 def imu_without_gravity(messages, site):
     """The driver removed gravity, as linear acceleration of some fused outputs."""
     rest = [m for m in messages if m.kind == "imu"][:200]
@@ -306,7 +303,7 @@ def imu_not_finite(share):
 
 
 def clock_jump(seconds, stamps=True, record=True):
-    """From the beginning of the fault on, all clocks that are said run `seconds` ahead (or behind)."""
+    """From the beginning of the fault on, the clocks of stamps and records (or of one of them) run `seconds` ahead."""
     shift = nanoseconds(seconds)
     def inject(messages, site):
         result = []
@@ -324,7 +321,7 @@ def clock_jump(seconds, stamps=True, record=True):
 
 
 def bag_loop(messages, site):
-    """Plays on, and then from the start again: stamps jump back, the recording goes on."""
+    """The bag is played to the fault and then from the start again: stamps jump back, the recording goes on."""
     until = [m for m in messages if site.seconds(m) < site.begin]
     length = until[-1].record - until[0].record + nanoseconds(0.005)
     return until + [m.recorded_at(m.record + length) for m in messages]

@@ -1,4 +1,4 @@
-"""What a run of the bag runner on a faulty bag came to, in figures that expectations are about."""
+"""Figures of a run on a faulty bag, for the expectations."""
 import dataclasses
 import pathlib
 import re

@@ -101,7 +101,7 @@ def draw_offset(table, true_offset):
     shown = list(offset)
     if true_offset is not None:
         shown.append(1e3 * true_offset)
-    # The first sigma spans the whole prior: scaled to the estimates and the settled band.
+    # The first sigma is that of the prior, so the axis is scaled to the estimates and the settled band.
     settled = 3 * float(np.median(sigma[len(sigma) // 2:]))
     low, high = min(shown) - settled, max(shown) + settled
     margin = 0.08 * max(high - low, 0.1)
@@ -149,7 +149,7 @@ def draw_extrinsics(table, configured):
             axes.plot(t, value, color=colour, linewidth=1.2, label=axis)
             settled = max(settled, 2 * float(np.median(sigma[len(sigma) // 2:])))
         axes.axhline(0.0, color=TRUTH, linewidth=1.2, linestyle="--", label="configured")
-        # The first sigma is that of the prior: scaled to the estimates, the value configured and the settled band.
+        # Scaled likewise, and to the configured value.
         reach = 1.08 * max(unit * float(np.abs(values).max()) + settled, 1e-3)
         axes.set_ylim(-reach, reach)
         finish_axes(axes, label)

@@ -18,12 +18,12 @@ from ..errors import RioTError
 from ..rig import radars_of, read_config
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
 from .animation import write_animation
-from .motion import extrinsics_in, motion, predicted_ego_velocity, rises
+from .motion import configured_extrinsics, motion, predicted_ego_velocity, rises
 from .page import Page
 
 CAUSAL = "trajectory.txt"
 ESTIMATES = ((figures.OPTIMIZED, "trajectory_optimized.txt"), (figures.ESTIMATE, CAUSAL))
-# By the mode of the run: what the two trajectories are called, and what they are.
+# By the mode of the run: the names of the two trajectories, and their meaning.
 NAMES = {
     "online": (("optimised", "online"), "online is what a live user gets, optimised what left the smoother's window"),
     "refine": (("optimised", "last pass"), "last pass is the causal output of the last pass, optimised what left the "
@@ -44,7 +44,7 @@ class Track:
 @dataclasses.dataclass
 class Radar:
     """What is drawn of a radar. Tables are None if their file is absent or has no row; they have a column `time` [s]."""
-    name: str  # empty if there is but one
+    name: str  # empty if there is only one
     offset: Optional[dict]
     scans: Optional[dict]
     extrinsics: Optional[dict]
@@ -221,7 +221,7 @@ def add_extrinsics(page, radar, folder):
     """The estimate over time, and how far it went from the mounting configured."""
     path = folder / "summary.yaml"
     if path.is_file():
-        configured = extrinsics_in(run_folder.read_yaml(path), path, "configured_", radar.name)
+        configured = configured_extrinsics(run_folder.read_yaml(path), path, radar.name)
         note = ""
     else:  # the run did not finish: only its first estimate is left of what was configured
         configured = last_extrinsics({name: column[:1] for name, column in radar.extrinsics.items()})

@@ -11,14 +11,14 @@ USED = (MOVING, "zero_velocity")    # status of a used scan that has a velocity 
 POINTS_ONLY = "points_only"         # of a used scan that has none
 
 
-# [s] A central difference over h to either side loses (2 pi f h)^2 / 6 of a motion of frequency f: of 1 Hz, as an arm or
-# a vehicle has it, 8 % here. Poses of 10 Hz pass, with a tenth for their jitter.
+# [s] A central difference over h to either side loses (2 pi f h)^2 / 6 of a motion of frequency f. At 1 Hz, as of an arm
+# or a vehicle, this is 8 %. Poses at 10 Hz pass, with a tenth for their jitter.
 LONGEST_STEP = 0.11
 LONGEST_GAP = 2 * LONGEST_STEP  # one pose is missing
 
 
 def rises(t):
-    """False if a clock went back: then a time says no more which pose is meant."""
+    """Whether the times rise. If a clock went back, a time no longer names one pose."""
     return bool(np.all(np.diff(t) > 0))
 
 
@@ -42,11 +42,11 @@ def motion(t, trajectory):
     return at, v_I, omega_I
 
 
-def extrinsics_in(content, path, prefix="", radar=""):
-    """Position of the radar in the IMU frame and R_IR, of the keys that begin with `prefix`."""
-    keys = [of_radar(f"{prefix}extrinsics_{what}", radar) for what in ("translation", "rotation_xyzw")]
+def configured_extrinsics(summary, path, radar):
+    """Position of the radar in the IMU frame and R_IR, as the summary of the run in `path` names them."""
+    keys = [of_radar(f"configured_extrinsics_{what}", radar) for what in ("translation", "rotation_xyzw")]
     try:
-        lever, rotation = (np.array(content[key], dtype=float) for key in keys)
+        lever, rotation = (np.array(summary[key], dtype=float) for key in keys)
         return lever.reshape(3), Rotation.from_quat(rotation.reshape(4))
     except (KeyError, TypeError, ValueError):
         raise RioTError(f"{path}: expected {keys[0]} (3 numbers) and {keys[1]} (4 numbers)") from None
