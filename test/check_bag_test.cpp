@@ -585,7 +585,7 @@ TEST_F(CheckBag, AnEditedConfigurationIsKept) {
   std::ofstream(request.out) << "# mine\n";
   std::ostringstream out, again;
   EXPECT_EQ(runCheck(request, out), 0);
-  EXPECT_NE(out.str().find("(what was there is now " + request.out + "~)"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("(the old file is now " + request.out + "~)"), std::string::npos) << out.str();
   EXPECT_EQ(contents(request.out + "~"), "# mine\n");
   // The same once more: nothing is replaced, and the older one stays.
   EXPECT_EQ(runCheck(request, again), 0);

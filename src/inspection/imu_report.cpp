@@ -15,10 +15,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;   // [m/s^2]
-constexpr double kMeanWidth = 0.2;  // [s] over which a direction of gravity is averaged, at least
-constexpr std::size_t kApart =
-    3;  // [means] between the two directions of gravity that are compared: about 0.6 s
+constexpr double kGravity = 9.81;    // [m/s^2]
+constexpr double kMeanWidth = 0.2;   // [s] over which a direction of gravity is averaged, at least
+constexpr std::size_t kApart = 3;    // [means] between two directions that are compared: about 0.6 s
 constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns faster for a tenth of the time
 constexpr double kLeastTilt = 0.03;  // [rad] rms of gravity's turns in 0.6 s; less does not show the unit
 

@@ -17,17 +17,15 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kWindow = 3.0;            // [s]
-constexpr std::size_t kMinVelocities = 6;  // of a window: two lines take four
+constexpr std::size_t kMinVelocities = 6;  // of a window: two of them fix its own six unknowns
 constexpr double kMinMotion = 0.25;        // [m/s] that a window must exceed to count as motion
 constexpr double kGravity = 9.81;          // [m/s^2] anywhere on earth to 0.03
 constexpr double kLeverArmSigma = 0.5;     // [m] per axis, around zero
-constexpr double kVelocitySigma =
-    0.08;  // [m/s] errors that neither the covariance of a velocity nor that of the IMU contains
+constexpr double kVelocitySigma = 0.08;    // [m/s] errors that no covariance of radar or IMU contains
 constexpr double kGravitySigma = 0.5;      // [m/s^2] of gravity by the mean specific force: 3 degrees
 constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of gravity by a rest: the bias of the accelerometer
-constexpr double kGyroDrift =
-    3.0e-4;  // [rad/s] what is left of the gyro's bias, by which gravity from a rest drifts
-constexpr double kOutlier = 3.0;  // [sigma] a velocity that is farther off counts less than half
+constexpr double kGyroDrift = 3.0e-4;  // [rad/s] what is left of the gyro's bias turns gravity from a rest
+constexpr double kOutlier = 3.0;       // [sigma] a velocity that is farther off counts less than half
 
 /// Each window has six unknowns besides the mounting: its first velocity in G, and gravity in G.
 constexpr Eigen::Index kMounting = kMountingM + kMountingL, kOwn = 6, kUnknowns = kMounting + kOwn;
@@ -187,8 +185,7 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingPr
       window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
     }
   }
-  constexpr double kMeanOverMedian =
-      1.27;  // of chi-squared with three degrees of freedom, whose median is 2.37
+  constexpr double kMeanOverMedian = 1.27;  // of chi-squared with three degrees of freedom
   return std::max(1.0, kMeanOverMedian * quantile(std::move(squares), 0.5));
 }
 

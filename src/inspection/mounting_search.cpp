@@ -23,8 +23,7 @@ constexpr double kAheadSigma = 0.5;     // [rad] of the pitch, likewise
 constexpr double kUprightWeight = 9.0;  // [sigma^2] upside down costs four times this more than upright
 constexpr double kClear = 25.0;         // [sigma^2] a sign that fits better by this counts as known
 constexpr double kAlike = 2.0;          // errors within a window are correlated: they count as half as many
-constexpr double kOffsetFactor =
-    3.0;  // widens the sigma, since velocities of noisy points shift the bottom of the curve
+constexpr double kOffsetFactor = 3.0;   // widens the sigma: noisy points shift the bottom of the curve
 
 /// A mounting M = sign R, and what it costs.
 struct Found {

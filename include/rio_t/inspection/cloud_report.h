@@ -17,8 +17,7 @@ struct CloudReport {
   double azimuth_95 = 0.0, elevation_95 = 0.0;  ///< [rad] 95 % of the points are within this of forward (y)
   double behind = 0.0;                          ///< share of the points with a negative y
   double ambiguous = 0.0;                       ///< share of the points that markAmbiguous() marks
-  Eigen::Vector3d mean_direction =
-      Eigen::Vector3d::Zero();  ///< of unit vectors; a short one: the radar looks all around
+  Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< of unit vectors; short: it looks all around
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< standard deviation of the unit vectors, per axis
   bool has_doppler = false;                          ///< some Doppler is not zero
 };

@@ -25,10 +25,9 @@ struct ImuReport {
   Eigen::Vector3d rest_rate = Eigen::Vector3d::Zero();          ///< mean: the gyro's bias
   Eigen::Vector3d mean_acceleration = Eigen::Vector3d::Zero();  ///< of the whole recording
 
-  double accel_density_quiet = 0.0;  ///< [m/s^2/sqrt(Hz)] white noise, in the quietest tenth of the seconds
-  double accel_density_median =
-      0.0;                          ///< the same in the median second: more than quiet if the frame vibrates
-  double gyro_density_quiet = 0.0;  ///< [rad/s/sqrt(Hz)]
+  double accel_density_quiet = 0.0;   ///< [m/s^2/sqrt(Hz)] white noise, in the quietest tenth of the seconds
+  double accel_density_median = 0.0;  ///< in the median second: more if the frame vibrates
+  double gyro_density_quiet = 0.0;    ///< [rad/s/sqrt(Hz)]
   double largest_acceleration = 0.0, largest_rate = 0.0;  ///< on one axis
   std::size_t saturated = 0;                              ///< samples at the end of the range
   std::size_t repeated = 0;  ///< samples with the values of the one before, although the IMU turns

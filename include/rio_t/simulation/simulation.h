@@ -10,7 +10,7 @@
 
 namespace rio_t::simulation {
 
-/// A rig. Its one radar is the base RadarSetup, unless `radars` names several.
+/// A rig with one radar, the base RadarSetup, unless `radars` names several.
 struct SimulationOptions : RadarSetup {
   std::uint64_t seed = 0;
   Time start = Time::fromNanoseconds(1'700'000'000'000'000'000);  ///< stamp of the first IMU sample

@@ -275,7 +275,8 @@ class BagJob {
     truth_error_.reset();
     if (hasTruth() && !summary.imu_restarts.empty()) {
       summary.warnings.emplace_back(
-          "the ground truth judges no trajectory that starts again: run each part by itself");
+          "the trajectory starts again, so it is not compared with the ground truth: run each part by "
+          "itself");
     } else if (hasTruth()) {
       try {
         if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);

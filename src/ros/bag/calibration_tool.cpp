@@ -89,7 +89,7 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   out << describeCalibration(calibration);
   const std::string kept =
       writeFile(arguments.out, calibratedYaml(calibration, config, entries, arguments.config));
-  out << "written to " << arguments.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
+  out << "written to " << arguments.out << (kept.empty() ? "" : " (the old file is now " + kept + ")")
       << "\n";
   return 0;
 }

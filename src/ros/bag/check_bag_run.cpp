@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The script beside the program, as in an installed package and in a build folder.
+/// The script is beside the program, in an installed package and in a build folder.
 std::string drawRigScript() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
@@ -81,12 +81,12 @@ int runCheck(const CheckRequest& request, std::ostream& out) {
     return kExitFailed;
   }
   if (recordings.size() > 1)
-    out << "The configuration is that of " << best->bags.front() << ", which shows most.\n";
+    out << "The configuration is that of " << best->bags.front() << ", which shows the mounting best.\n";
   if (request.out.empty()) {
     out << "\n" << best->yaml;
   } else {
     const std::string kept = writeFile(request.out, best->yaml);
-    out << "Written to " << request.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
+    out << "Written to " << request.out << (kept.empty() ? "" : " (the old file is now " + kept + ")")
         << ". Next: rosrun rio_t rio_t_bag";
     for (const std::string& bag : best->bags)
       out << " --bag " << (request.bags_go_away ? "BAG" : quoted(bag));

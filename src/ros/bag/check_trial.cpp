@@ -120,7 +120,6 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     note = its_note;
   };
   attempt(config, "");
-  // One radar alone may run better.
   for (const auto& [name, keys] : config.radars) {
     if (best.good()) break;
     ProposedConfig alone{config.top_level, {}};

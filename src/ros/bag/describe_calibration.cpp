@@ -96,7 +96,8 @@ std::string describeCalibration(const BagCalibration& calibration) {
   std::string paths;
   for (const CalibrationBag& bag : calibration.bags) {
     if (!bag.failure.empty()) continue;
-    paths += (count++ == 0 ? "" : ", ") + bag.path;
+    ++count;
+    appendItem(&paths, bag.path);
   }
   std::string text = std::to_string(count) + " of " + std::to_string(calibration.bags.size()) +
                      (calibration.bags.size() == 1 ? " bag counts: " : " bags count: ") + paths + "\n";

@@ -274,8 +274,7 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& co
 bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& configured,
                  FormatProposal* proposal) {
   constexpr double kLooks = 0.4;  // a mean direction that is longer than this shows where the radar looks
-  constexpr double kWider =
-      1.5;  // a usual field of view is this many times wider in azimuth than in elevation
+  constexpr double kWider = 1.5;  // a field of view is wider in azimuth, by about this
   PointCloudFormat& format = proposal->format;
   if (format.coordinates != PointCoordinates::kCartesian) return false;
   if (makeConfig(configured).radar_overrides.axes) return false;

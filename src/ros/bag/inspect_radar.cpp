@@ -99,8 +99,7 @@ void describeCloud(const RadarAnalysis& analysis, const FormatProposal& format, 
   for (const std::string& odd : format.odd) radar->odd("format", odd);
   const KnownDoppler& step = analysis.velocities.doppler_step;
   const bool sparse = radar->isSparse();
-  constexpr double kManyEmpty =
-      0.2;  // fewer are usual: a radar that drops static points sees nothing at rest
+  constexpr double kManyEmpty = 0.2;  // some are usual: a radar that drops static points sees none at rest
   const bool often_empty = c.empty > kManyEmpty;
   radar->tell(sparse || often_empty ? FindingLevel::kOdd : FindingLevel::kOk, "points",
               fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " +
@@ -154,18 +153,18 @@ void describeSign(const RadarAnalysis& analysis, const FormatProposal& format, c
     appendItem(&evidence, "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)",
                " and ");
   if (search.mirrored) {
-    radar->odd(
-        "axes",
-        "the ranges say that " + field + " is " +
-            (analysis.sign.sign > 0 ? "positive for receding" : "negative for receding") +
-            " targets, the IMU the contrary. Either the axes of the cloud are left-handed (one axis is "
-            "inverted): radar_doppler_sign and the mounting stand for it. Or the accelerometer is "
-            "negated (it measures gravity, not the specific force): then the track is a mirror image, "
-            "so correct the driver of the IMU. " +
-            howToTellNegated(imu));
+    radar->odd("axes",
+               "the ranges say that " + field + " is " +
+                   (analysis.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+                   " targets, and the IMU says the contrary. Either the axes of the cloud are left-handed "
+                   "(one axis is "
+                   "inverted): radar_doppler_sign and the mounting make up for it. Or the accelerometer is "
+                   "negated (it measures gravity, not the specific force): then the track is a mirror image, "
+                   "so correct the driver of the IMU. " +
+                   howToTellNegated(imu));
     radar->keys.set(
         "radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
-        "One axis of the cloud is inverted: this sign and the mounting below stand for it. Or the "
+        "One axis of the cloud is inverted: this sign and the mounting below make up for it. Or the "
         "accelerometer is negated: then correct the driver of the IMU.");
   } else if (search.sign == -1) {
     radar->odd("Doppler", field + " is positive for approaching targets, shown by " + evidence);
@@ -342,8 +341,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   if (correctAxes(analysis.cloud, mirrored, configured, &format))
     analysis = analyse(recording, imu, cloud, stamps, format.format, track);
   const std::optional<Eigen::Vector3d> up = upOf(imu.report);
-  constexpr double kUpright =
-      0.9;  // cosine of the largest tilt of the IMU: mounting angles assume that its z is up
+  constexpr double kUpright = 0.9;  // cosine of the largest tilt: mounting angles assume that z is up
   if (!analysis.velocities.has_elevation && analysis.search.enough && up && up->z() > kUpright)
     analysis.search.q_IR = levelled(analysis.search.q_IR);
   radar.usable = true;

@@ -19,7 +19,9 @@
 namespace rio_t {
 namespace {
 
-constexpr const char* kTypes[] = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
+constexpr const char* kImuType = "sensor_msgs/Imu";
+constexpr const char* kCloudType = "sensor_msgs/PointCloud2";
+constexpr const char* kHeaderType = "std_msgs/Header";
 
 template <typename Topic>
 Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
@@ -49,12 +51,12 @@ void readMessages(rosbag::View& view, const ParameterEntries& configured, Record
     const Time record = toTime(instance.getTime());
     const std::string& type = instance.getDataType();
     const std::string& name = instance.getTopic();
-    if (type == kTypes[0]) {
+    if (type == kImuType) {
       const auto message = rio_t::read<sensor_msgs::Imu>(instance);
       ImuTopic& topic = topicOf(name, &recording->imus);
       addImu(*message, record, &topic);
       topic.publishers.add(instance.getCallerId(), message->header.frame_id);
-    } else if (type == kTypes[1]) {
+    } else if (type == kCloudType) {
       if (refused.count(name) != 0) continue;
       CloudTopic& topic = topicOf(name, &recording->clouds);
       topic.messages.emplace_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
@@ -114,10 +116,10 @@ Recording readRecording(const std::vector<std::string>& paths, const CheckReques
     radar_topics.push_back(topicOfBag(topic, recording.types));
   const auto is_wanted = [&](const rosbag::ConnectionInfo* connection) {
     const std::string& type = connection->datatype;
-    if (type == kTypes[0]) return imu_topic.empty() || imu_topic == connection->topic;
-    if (type == kTypes[1])
+    if (type == kImuType) return imu_topic.empty() || imu_topic == connection->topic;
+    if (type == kCloudType)
       return radar_topics.empty() || boost::algorithm::any_of_equal(radar_topics, connection->topic);
-    return type == kTypes[2];
+    return type == kHeaderType;
   };
   rosbag::View view;
   bags.addTo(&view, is_wanted, first, end);

@@ -12,10 +12,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kLargestDelay =
-    1.0;  // [s] from the stamp of a scan to its arrival; if it is longer, the clocks differ
-constexpr double kAhead =
-    0.02;  // [s] from the arrival of a scan to its stamp; if it is longer, the clocks differ
+constexpr double kLargestDelay = 1.0;  // [s] from stamp to arrival of a scan; beyond, the clocks differ
+constexpr double kAhead = 0.02;        // [s] from arrival to stamp; beyond, the clocks differ
 
 std::string milliseconds(double seconds) { return fixedText(1e3 * seconds, 0) + " ms"; }
 

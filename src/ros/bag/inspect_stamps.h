@@ -23,8 +23,7 @@ struct StampProposal {
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
                             const CloudTopic& cloud, const ParameterEntries& configured);
 
-/// Stamps scans as the programs would. `scans`: one for each message of the topic. Returns those that get a
-/// stamp.
+/// Stamps scans as the programs would, one for each message. Returns those that get a stamp.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
                                   const CloudTopic& cloud, const StampingOptions& options,
                                   const std::vector<RadarScan>& scans);

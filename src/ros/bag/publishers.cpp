@@ -34,7 +34,7 @@ std::string Publishers::describeSeveral(const std::string& topic) const {
       callers.size() > 1
           ? std::to_string(callers.size()) +
                 " publishers by turns: " + boost::algorithm::join(callers_with_frames, " and ")
-          : std::to_string(frames.size()) + " frame_ids by turns, and so of several publishers: " +
+          : std::to_string(frames.size()) + " frame_ids by turns, so several nodes publish it: " +
                 boost::algorithm::join(frames, " and ");
   return "Topic " + topic + " has messages of " + text + ". rio_t takes them for one sensor.";
 }

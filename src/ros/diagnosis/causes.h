@@ -18,7 +18,6 @@ inline constexpr double kManyScans = 0.3;
 inline constexpr double kManyPoints = 0.6;
 /// The diagnosis needs so many scans of a radar: two seconds at ten a second.
 inline constexpr std::uint64_t kEnoughScans = 20;
-/// The remedy for a wrong mounting, sign or axes.
 inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds them.";
 
 inline std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {

@@ -63,8 +63,7 @@ class RadarCauses {
     const KnownDoppler& used = radar_.knowledge.doppler_step;
     const KnownDoppler& read = radar_.knowledge.read_doppler_step;
     if (used.source != DopplerSource::kGiven || read.source != DopplerSource::kData) return;
-    constexpr double kOther =
-        1.5;  // a wrong step is at least twice the true one; a smaller difference may be rounding
+    constexpr double kOther = 1.5;  // a wrong step is at least twice the true one; less is rounding
     if (read.value == 0.0 || used.value < kOther * read.value) return;
     cause("doppler_step_far", 1.0 - read.value / used.value,
           "The Dopplers" + of_ + " are multiples of " + shortText(read.value, 3) + " m/s, and " + key_ +

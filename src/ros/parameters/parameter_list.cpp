@@ -120,7 +120,8 @@ void ParameterList::vector3(const std::string& key, const std::string& unit, Ran
 
 void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
   bind(
-      {key, "list", "", "a list of 4 finite numbers of norm 1 to 0.001 (order x, y, z, w)", text}, member,
+      {key, "list", "", "a list of 4 finite numbers (x, y, z, w) with a norm between 0.999 and 1.001", text},
+      member,
       [](const ParameterValue& value) -> std::optional<Eigen::Quaterniond> {
         const auto x = asNumbers(value, 4, Range{});
         if (!x) return std::nullopt;

@@ -74,7 +74,7 @@ struct RunFile {
   std::string name, header;
 };
 
-/// Says which files a run writes. With several radars, each radar has files of its own, which carry its name.
+/// Which files a run writes. With several radars, those of a radar carry its name.
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
   bool extrinsics = false;                 ///< the run estimates them

@@ -117,7 +117,6 @@ struct LandmarkCounts {
   void add(const ScanResult& result);
 };
 
-/// Counters of a run, by which diagnose() judges it.
 struct RunEvidence {
   bool initialized = false;
   InitializedFrom initialized_from = InitializedFrom::kRest;
@@ -130,18 +129,16 @@ struct RunEvidence {
   Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
   std::uint64_t divergences = 0, reinitializations = 0;
   Health health = Health::kOk;
-  std::uint64_t scans_judged = 0;    ///< after the start
-  std::uint64_t scans_diverged = 0;  ///< of scans_judged, those after which the health was "diverged"
-  std::uint64_t scans_contradicted =
-      0;  ///< of scans_diverged, those after which the scans contradicted the estimate
+  std::uint64_t scans_judged = 0;        ///< after the start
+  std::uint64_t scans_diverged = 0;      ///< of scans_judged, those after which the health was "diverged"
+  std::uint64_t scans_contradicted = 0;  ///< of scans_diverged; the scans contradicted the estimate
   /// Windows by the reason why the solver stopped. With mode batch, the one solve of the whole run.
   Counts solver_terminations;
   MeasuredImuNoise imu_noise;  ///< of the run, root mean square
   // [s] of IMU time since the start, without jumps of the clock. Zero in the live node, whose monitor reports
   // silence itself.
   double run_seconds = 0.0;
-  double silent_seconds =
-      0.0;  ///< of run_seconds, the time more than `coasting_after` after the last used scan
+  double silent_seconds = 0.0;                    ///< more than `coasting_after` after the last used scan
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
   std::vector<ImuRestart> imu_restarts;  ///< empty in the live node, whose evidence starts anew after each
   std::vector<std::string> several_publishers;        ///< a sentence for each topic of a bag that has several
@@ -156,7 +153,6 @@ class EvidenceCollector {
   explicit EvidenceCollector(const Config& config);
 
   void add(const ScanResult& result);
-  /// A sample of the IMU.
   void addImu(Time time) {
     if (!oldest_imu_ || time < *oldest_imu_) oldest_imu_ = time;  // its clock may jump back
     const double step = newest_imu_ ? time - *newest_imu_ : 0.0;
