@@ -430,8 +430,9 @@ TEST_F(Calibrate, WhatIsFarFromWhatWasToldIsSaid) {
   told_ = truth_;
   const Outcome outcome = calibrateBags({bag_}, {"--set", "radar_axes=flu"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  expectSays(outcome.out, {"The turn about z is 9.", "are topic, axes, signs and units right?"});
-  EXPECT_EQ(countOf("away from it", outcome.out), 1u) << outcome.out;
+  expectSays(outcome.out, {"The turn about z differs from the given value by 9.",
+                           "are topic, axes, signs and units right?"});
+  EXPECT_EQ(countOf("differs from the given value", outcome.out), 1u) << outcome.out;
 }
 
 TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
