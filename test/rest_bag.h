@@ -46,6 +46,7 @@ struct BagContents {
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
   std::vector<std::string> radar_topics = {"/sensor_platform/radar/scan"};
+  std::string cloud_frame;
 };
 
 /// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
@@ -90,6 +91,7 @@ class RestBag : public testing::Test {
     sensor_msgs::PointCloud2 cloud;
     if (what.stamped) cloud.header.stamp = stamp;
     cloud.header.seq = static_cast<std::uint32_t>(seq);
+    cloud.header.frame_id = what.cloud_frame;
     sensor_msgs::PointCloud2Modifier modifier(cloud);
     modifier.setPointCloud2Fields(5, "x", 1, sensor_msgs::PointField::FLOAT32, "y", 1,
                                   sensor_msgs::PointField::FLOAT32, "z", 1, sensor_msgs::PointField::FLOAT32,

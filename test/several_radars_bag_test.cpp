@@ -97,6 +97,16 @@ TEST_F(TwoRadars, MissingTopicsAndWrongTypesNameTheirRadar) {
       {"topic /other (right/radar_topic) is std_msgs/Header", "no topic /absent (left/trigger_topic"});
 }
 
+TEST_F(TwoRadars, EveryTransformThatIsMissingIsNamed) {
+  BagContents what;
+  what.radar_topics = kTwoTopics;
+  what.cloud_frame = "front";
+  writeBag(what);
+  expectError(runTwo({"--set", "extrinsics_source=tf", "--set", "imu_frame=imu"}),
+              {"radar left: no tf from front to imu ", "; radar right: no tf from front to imu ",
+               "the bag has no tf"});
+}
+
 TEST_F(TwoRadars, OneTopicForBothIsRefusedAlsoIfOneHasNoSlash) {
   BagContents what;
   what.radar_topics = {"/left"};

@@ -9,6 +9,7 @@
 
 #include <vector>
 
+#include "../text.h"
 #include "rio_t/ros/frames/frames.h"
 
 namespace rio_t {
@@ -22,7 +23,7 @@ std::string firstFrame(const Bags& bags, const std::string& topic) {
   return view.begin() == view.end() ? "" : read<Message>(*view.begin())->header.frame_id;
 }
 
-/// Returns T_IR by radar. If a transform is missing, `missing` says which.
+/// Returns T_IR by radar. `missing` gets the transforms that are missing; empty: none.
 std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Config>& radars,
                                const std::string& imu_frame, const std::vector<std::string>& cloud_frames,
                                std::string* missing) {
@@ -34,8 +35,11 @@ std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Conf
     try {
       T_IR.back() = radarExtrinsics(tf, radars[k], imu_frame, cloud_frames[k]);
     } catch (const tf2::TransformException& error) {
-      *missing = "no tf from " + cloud_frames[k] + " to " + imu_frame + " (extrinsics_source: tf; " +
-                 error.what() + ")";
+      const std::string& name = radars[k].radar_name;
+      appendItem(missing,
+                 (name.empty() ? "" : "radar " + name + ": ") + "no tf from " + cloud_frames[k] + " to " +
+                     imu_frame + " (extrinsics_source: tf; " + error.what() + ")",
+                 "; ");
     }
   }
   return T_IR;
