@@ -46,7 +46,7 @@ struct BagContents {
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
   std::vector<std::string> radar_topics = {"/sensor_platform/radar/scan"};
-  std::string cloud_frame;
+  std::string cloud_frame{};
 };
 
 /// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
