@@ -58,8 +58,6 @@ inside=(unshare --mount --pid --fork --kill-child -- bash -euc '
     RIO_T_WERROR=ON RIO_T_BUILD_DIR=/build RIO_T_DATA_DIR=/data PYTHONDONTWRITEBYTECODE=1 CCACHE_DIR=/ccache \
     CMAKE_CXX_COMPILER_LAUNCHER=ccache bash -euc '\''cd /rio_t && "$@"'\'' inside "$@"
 ' inside "$root" "$source" "$data")
-if [ $# -eq 0 ]; then
-  "${inside[@]}" scripts/install_dependencies.sh ccache
-  set -- scripts/test.sh
-fi
+"${inside[@]}" scripts/install_dependencies.sh ccache
+[ $# -gt 0 ] || set -- scripts/test.sh
 "${inside[@]}" "$@"
