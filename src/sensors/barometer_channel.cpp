@@ -156,7 +156,7 @@ void BarometerChannel::climbTo(const NodeEstimate& node, const FixedLagSmoother&
 
 BarometerChannel::Slope BarometerChannel::slopeWith(const Deviation& deviation, double noise, double span) {
   const double memory = std::cbrt(12.0 * noise * span * std::pow(options_.gate / options_.gate_slope, 2));
-  // The pressure may have changed in a silence, so the line begins anew.
+  // The pressure may have changed in a silence, so the lines begin anew.
   if (!deviations_.empty() && deviation.time - deviations_.back().time > memory + kMissing * span)
     deviations_.clear();
   deviations_.push_back(deviation);

@@ -82,7 +82,6 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   prediction.scan.tau = time;
   prediction.scan.x = state->x;
   prediction.scan.T_IR = T_IR;
-  if (!options_.estimate_time_offset) J.col(kOffset).setZero();
   prediction.velocity.covariance = J * P * J.transpose();
   Eigen::Matrix<double, 3, Eigen::Dynamic> J_at_offset = J;
   J_at_offset.col(kOffset).setZero();

@@ -9,7 +9,8 @@
 
 namespace rio_t {
 
-/// What a recording shows of an IMU. All values are in m/s^2 and rad/s, except those marked "as written".
+/// The properties of an IMU, as a recording shows them. Values are in m/s^2 and rad/s, unless marked "as
+/// written".
 struct ImuReport {
   std::vector<ImuMeasurement> samples;  ///< those that are finite and do not repeat the one before
   std::size_t not_finite = 0;

@@ -26,7 +26,7 @@ struct MountingSearchOptions {
   std::optional<Eigen::Vector3d> up_I;
 };
 
-/// What a recording shows of the mounting of a radar.
+/// The mounting of a radar, as a recording shows it.
 struct MountingSearch {
   bool enough = false;  ///< whether there was enough motion to look at; if not, the rest is empty
 

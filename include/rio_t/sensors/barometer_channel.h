@@ -100,12 +100,12 @@ class BarometerChannel {
     Time node;
     double height = 0.0;  ///< [m]
   };
-  /// The straight line through the deviations (docs/method.md, eq. 19i).
+  /// The straight line through all deviations (docs/method.md, eq. 19i).
   struct Slope {
     double value = 0.0;       ///< [m/s]
     double innovation = 0.0;  ///< [m] the mean of the deviations' innovations
-    bool is_whole = false;    ///< the deviations last long enough for both
-    bool is_steep = false;    ///< this line, or one through only the newest deviations
+    bool is_whole = false;    ///< whether the deviations last long enough for both
+    bool is_steep = false;    ///< whether this line is too steep, or one through only the newest deviations
   };
   static void add(const Sample& sample, Mean& mean);
   /// [s] of the recent samples; none before the third one.

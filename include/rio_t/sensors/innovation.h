@@ -14,9 +14,9 @@ struct Innovation {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< measured minus predicted velocity, in R [m/s]
   Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< covariance of d [m^2/s^2]
   Eigen::Matrix3d S_at_offset = Eigen::Matrix3d::Identity();  ///< the same if the offset were known
-  // Derivative of the velocity with respect to t_O [m/s^2]. d contains the noise of the IMU before the scan.
-  // So d must be combined with J_after, which does not contain it, or with the part of J_mean that the
-  // estimate has not followed, in which it cancels (docs/method.md, eq. 18h).
+  // Derivatives of the velocity with respect to t_O [m/s^2]. d contains the noise of the IMU before the scan.
+  // J_after does not contain this noise. J_mean does: use only the part of it that the estimate has not
+  // followed, in which the noise cancels (docs/method.md, eq. 18h).
   Eigen::Vector3d J_after = Eigen::Vector3d::Zero();  ///< from the samples after the scan
   Eigen::Vector3d J_mean = Eigen::Vector3d::Zero();   ///< from both sides
 

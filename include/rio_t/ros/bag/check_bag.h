@@ -8,7 +8,7 @@
 
 namespace rio_t {
 
-/// What check_bag reads and writes.
+/// The input of check_bag, and the files that it writes.
 struct CheckRequest {
   std::vector<std::string> bags;          ///< paths
   std::string out;                        ///< gets the configuration; empty: none
@@ -33,7 +33,7 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// What check_bag found out about a bag, an IMU or a radar.
+/// A finding of check_bag about a bag, an IMU or a radar.
 struct Findings {
   std::vector<Finding> findings;
   std::string to_do;  ///< one sentence if something is missing

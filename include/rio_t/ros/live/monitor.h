@@ -25,7 +25,7 @@ class LiveMonitor {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-  /// What ROS knows about the input.
+  /// The state of the input, as ROS knows it.
   struct RosView {
     /// Types of what others publish, by topic: a topic of a wrong type brings no message. Needed only while
     /// lacksInput().
@@ -109,7 +109,7 @@ class LiveMonitor {
     std::string why_not_usable;  ///< of the last one
   };
 
-  /// What has become of the scans of a radar.
+  /// How many scans of a radar were usable, used and dropped.
   struct Account {
     std::uint64_t usable = 0, used = 0;
     std::map<std::string, std::uint64_t> dropped;
@@ -125,7 +125,7 @@ class LiveMonitor {
     std::optional<LiveSession::Result> last_update;
     std::deque<Account> accounts;  ///< as of the last calls of describeInput, newest last
   };
-  /// What is wrong; `level` is that of diagnostic_msgs/DiagnosticStatus.
+  /// A fault; `level` is that of diagnostic_msgs/DiagnosticStatus.
   struct Finding {
     std::uint8_t level = 0;
     std::string text;

@@ -14,7 +14,7 @@
 
 namespace rio_t {
 
-/// Where the stamp of a scan comes from (see stamping.h).
+/// The source of the stamps of scans (see stamping.h).
 enum class StampSource {
   kHeader,   ///< "header": the cloud's own header
   kTrigger,  ///< "trigger": the trigger message that belongs to the scan
@@ -33,14 +33,14 @@ enum class ExtrinsicsSource {
   kTf,          ///< "tf": the transform from the cloud's frame_id to the frame of the IMU
 };
 
-/// Where the live node takes T_BI from, the pose of the IMU in base_link.
+/// The source from which the live node takes T_BI, the pose of the IMU in base_link.
 enum class BaseExtrinsicsSource {
   kAuto,        ///< "auto": tf, if it knows both frames when the odometry starts; else the parameters
   kParameters,  ///< "parameters": base_extrinsics_translation and base_extrinsics_rotation_xyzw
   kTf,          ///< "tf": the node waits for the transform from the frame of the IMU to base_link_frame
 };
 
-/// Where the odometry of the live node goes on after a reset.
+/// The pose at which the odometry of the live node goes on after a reset.
 enum class ResetPose {
   kKeep,  ///< "keep": at the last pose
   kZero,  ///< "zero": at the origin
