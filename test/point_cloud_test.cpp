@@ -248,6 +248,21 @@ TEST(PointCloudDecode, PaddingIsNoPoint) {
   }
 }
 
+TEST(PointCloudDecode, ADoubleTooSmallForAFloatIsZero) {
+  PointCloudFormat f;
+  f.power_unit = PowerUnit::kNotSnr;
+  f.doppler = "d";
+  const PointCloud2 m = Message(1, 32)
+                            .field<double>("x", 0, PointField::FLOAT64, {0})
+                            .field<double>("y", 8, PointField::FLOAT64, {1e-300})
+                            .field<double>("z", 16, PointField::FLOAT64, {0})
+                            .field<double>("d", 24, PointField::FLOAT64, {1})
+                            .get();
+  const DecodedScan scan = decode(m, f);
+  EXPECT_EQ(scan.padding, 1u);
+  EXPECT_TRUE(scan.cloud.empty());
+}
+
 // --- To the core and back ---
 
 TEST(PointCloudConversion, MarksWhatIsAmbiguous) {

@@ -166,18 +166,18 @@ bool isFinite(const RadarPointPcl& p) {
          std::isfinite(p.snr_db);
 }
 
-/// Whether a driver only fills its cloud up with this point.
-bool isPadding(const std::array<double, 3>& p) {
-  const auto all = [&p](auto is) { return std::all_of(p.begin(), p.end(), is); };
-  return all([](double x) { return x == 0.0; }) || all([](double x) { return std::isnan(x); });
-}
-
 float narrow(double value) {
   // A conversion that overflows is undefined; the decoder drops a point with NaN.
   if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
     return std::numeric_limits<float>::quiet_NaN();
   }
   return static_cast<float>(value);
+}
+
+/// Whether a driver only fills its cloud up with this point.
+bool isPadding(const std::array<double, 3>& p) {
+  const auto all = [&p](auto is) { return std::all_of(p.begin(), p.end(), is); };
+  return all([](double x) { return narrow(x) == 0.0F; }) || all([](double x) { return std::isnan(x); });
 }
 
 }  // namespace
