@@ -9,23 +9,31 @@ namespace {
 
 /// [m/s^2] 200 g: no IMU for navigation reads more.
 constexpr double kImpossibleAcceleration = 2000.0;
+/// [rad/s] 20 000 degrees/s: the range of the fastest gyros on the market.
+constexpr double kImpossibleRate = 350.0;
 /// [ranges] No IMU reads more than twice its range. The configured range may be rounded.
 constexpr double kImpossibleShareOfRange = 2.0;
+
+/// The largest reading that is plausible.
+double mostPlausible(double range, double if_unknown) {
+  return range > 0.0 ? kImpossibleShareOfRange * range : if_unknown;
+}
 
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }
 
 }  // namespace
 
 ImuSampleCheck::ImuSampleCheck(const ImuInputCheckOptions& options)
-    : most_acceleration_(options.accel_range > 0.0 ? kImpossibleShareOfRange * options.accel_range
-                                                   : kImpossibleAcceleration),
+    : most_acceleration_(mostPlausible(options.accel_range, kImpossibleAcceleration)),
+      most_rate_(mostPlausible(options.gyro_range, kImpossibleRate)),
       max_gap_(options.max_bridged_gap),
       stamps_(options.max_bridged_gap, options.jump_patience) {}
 
 const char* ImuSampleCheck::faultOfValues(const ImuMeasurement& imu) const {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return "imu_not_finite";
-  // A reading of the gyro that is not plausible is replaced by ImuInputCheck.
-  return imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_ ? "imu_not_plausible" : nullptr;
+  const bool is_plausible = imu.acceleration.cwiseAbs().maxCoeff() <= most_acceleration_ &&
+                            imu.angular_velocity.cwiseAbs().maxCoeff() <= most_rate_;
+  return is_plausible ? nullptr : "imu_not_plausible";
 }
 
 // If the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise, as in

@@ -47,21 +47,36 @@ bool FrozenAxisDetector::isFrozen(Time time, double reading, bool turns) {
 
 std::optional<double> StuckAxisDetector::check(Time time, double reading, bool turns, bool is_saturated) {
   const bool is_frozen = frozen_.isFrozen(time, reading, turns);
-  const double jump = good_ ? std::abs(reading - *good_) : 0.0;
+  if (!good_) {
+    good_ = reading;
+    good_at_ = time;
+  }
+  const double since = std::max(0.0, time - good_at_);
+  const double jump = std::abs(reading - *good_);
+  const double unusual = kUnusual * usual_jump_;
+  const double limit = std::max(kSmallestJump, unusual);
+  const double from_stuck = stuck_at_ ? std::abs(reading - *stuck_at_) : 0.0;
   // After a jump that no mass makes, the noise of a stuck axis is no motion either.
-  const bool stays =
-      stuck_at_ && std::abs(reading - *stuck_at_) <= (is_impossible_ ? kUnusual * usual_jump_ : 0.0);
-  const bool jumps_away = !stuck_at_ && jump > std::max(kSmallestJump, kUnusual * usual_jump_);
+  const bool stays = stuck_at_ && from_stuck <= (is_impossible_ ? unusual : 0.0);
+  // A reading that is as far from the last wrong one is wrong, too.
+  const bool jumps_away = jump > limit && (!stuck_at_ || from_stuck > limit);
   const bool freezes = !stuck_at_ && is_frozen && !is_saturated;
   if (jumps_away || freezes) {
     stuck_at_ = reading;
-    is_impossible_ = jump > kHandShakes * (time - good_at_);
+    is_impossible_ = jump > kHandShakes * since;
   }
   if (stays || freezes || (jumps_away && is_impossible_))
-    return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
+    return *good_ * std::exp(-since / kMotionCorrelationTime);
   // Over a gap the rate of a platform may change so much. Only if the reading then repeats, it sticks.
   if (jumps_away) return std::nullopt;
-  if (!stuck_at_) usual_jump_ = std::max(fade(time - good_at_) * usual_jump_, jump);
+  if (stuck_at_ && jump > std::max(limit, kHandShakes * since)) {
+    // A turn that goes on to change does not stick. But it may be the next wrong reading: good_ stays until a
+    // platform can have come so far.
+    stuck_at_ = reading;
+    is_impossible_ = false;
+    return std::nullopt;
+  }
+  if (!stuck_at_) usual_jump_ = std::max(fade(since) * usual_jump_, jump);
   stuck_at_.reset();
   good_ = reading;
   good_at_ = time;

@@ -66,7 +66,7 @@ class ImuSampleCheck {
   /// Whether the sample is the one before once more, with a new stamp.
   bool repeats(const ImuMeasurement& imu);
 
-  double most_acceleration_, max_gap_;  // [m/s^2], [s] read-only after construction
+  double most_acceleration_, most_rate_, max_gap_;  // [m/s^2], [rad/s], [s] read-only after construction
   ClockJumpDetector stamps_;
   std::optional<ImuMeasurement> distinct_;        // the newest that did not repeat the one before
   std::optional<Time> latest_;                    // stamp of the last sample, dropped or not

@@ -26,9 +26,9 @@ class FrozenAxisDetector {
   bool is_frozen_ = false;
 };
 
-/// Follows one axis of a gyro and finds a reading that sticks: it jumps away from one sample to the next, as
-/// no mass can, and then stays there within its noise; or it jumps over a gap and then repeats itself; or it
-/// freezes. Not thread-safe.
+/// Follows one axis of a gyro and finds wrong readings. One that sticks jumps away from one sample to the
+/// next, as no mass can, and then stays there within its noise; or it jumps over a gap and then repeats
+/// itself; or it freezes. One that is corrupt jumps to and fro. Not thread-safe.
 class StuckAxisDetector {
  public:
   /// Takes a reading [rad/s]. Returns none if it may be used. Otherwise returns the most likely reading: the
@@ -36,9 +36,9 @@ class StuckAxisDetector {
   std::optional<double> check(Time time, double reading, bool turns, bool is_saturated);
 
  private:
-  std::optional<double> good_;  ///< the last reading that was used
+  std::optional<double> good_;  ///< the last reading that is no jump
   Time good_at_;
-  std::optional<double> stuck_at_;  ///< the reading that jumped away or froze, while it repeats
+  std::optional<double> stuck_at_;  ///< the last reading that jumped away or froze; none once it is back
   bool is_impossible_ = false;      ///< whether no mass can make that jump
   double usual_jump_ = 0.0;         ///< largest recent one between neighbours [rad/s]
   FrozenAxisDetector frozen_;
