@@ -2,6 +2,7 @@
 // pressures with any finite values and stamps. See scripts/fuzz.sh.
 #include <fuzzer/FuzzedDataProvider.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +17,7 @@ using rio_t::Time;
 constexpr double kGravity = 9.81;
 constexpr double kImuPeriod = 0.01;  // [s]
 constexpr double kLongest = 20.0;    // [s] of IMU; more takes too long
+constexpr double kLongestTime = 4.0e9;  // [s] stamps of ROS span 2^32 seconds
 
 void require(bool holds, const char* what) {
   if (holds) return;
@@ -54,8 +56,13 @@ rio_t::OdometryOptions anyOptions(FuzzedDataProvider& input) {
 /// Mostly small; at times anything.
 double number(FuzzedDataProvider& input, double most) {
   if (input.ConsumeIntegral<std::uint8_t>() != 0) return input.ConsumeFloatingPointInRange(-most, most);
-  const double any = input.ConsumeFloatingPoint<double>();
+  const double any = input.ConsumeFloatingPoint<float>();
   return std::isfinite(any) ? any : 0.0;
+}
+
+/// [s] A stamp is off by so much: mostly a little, at times by as much as stamps of ROS can be.
+double shift(FuzzedDataProvider& input, double most) {
+  return std::clamp(number(input, most), -kLongestTime, kLongestTime);
 }
 
 Vector3d vector(FuzzedDataProvider& input, double most) {
@@ -73,7 +80,7 @@ struct Rig {
   rio_t::ImuMeasurement imu(FuzzedDataProvider& input) {
     rio_t::ImuMeasurement sample;
     const auto choice = input.ConsumeIntegral<std::uint16_t>();
-    now = now + (choice == 1 ? number(input, 5.0) : kImuPeriod);
+    now = now + (choice == 1 ? shift(input, 5.0) : kImuPeriod);
     sample.time = now;
     const double noise = 1e-4 * (choice % 256);
     sample.angular_velocity = turn + Vector3d(noise, -noise, 0.5 * noise);
@@ -84,7 +91,7 @@ struct Rig {
   rio_t::RadarScan scan(FuzzedDataProvider& input, std::size_t radars) {
     rio_t::RadarScan scan;
     scan.radar = input.ConsumeIntegralInRange<std::size_t>(0, radars - 1);
-    scan.stamp = now + number(input, 0.3);
+    scan.stamp = now + shift(input, 0.3);
     const auto points = input.ConsumeIntegralInRange<std::size_t>(0, 24);
     for (std::size_t i = 0; i < points; ++i) {
       rio_t::RadarPoint point;
@@ -154,7 +161,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         rig.v_R = vector(input, 3.0);
         break;
       case 3:
-        odometry.addPressure({rig.now + number(input, 0.1), 1e5 + number(input, 100.0)});
+        odometry.addPressure({rig.now + shift(input, 0.1), 1e5 + number(input, 100.0)});
         break;
       case 4:
         odometry.addScan(rig.scan(input, options.radarCount()));

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Fuzzes the decoding of point clouds and the reading of parameter files, side by side, with the address and undefined
-# behaviour sanitizers (clang's libFuzzer).
+# Fuzzes the decoding of point clouds, the reading of parameter files and the odometry, side by side, with the address
+# and undefined behaviour sanitizers (clang's libFuzzer).
 #   scripts/fuzz.sh [SECONDS]    runs for that long [600]
 # It starts from fuzz/corpus/ and keeps new inputs in a temporary folder. If an input breaks something, the script keeps it
 # in build/fuzz/findings/, names it, and ends with exit status 1.
@@ -25,7 +25,8 @@ if [ ! -f "$build/Makefile" ]; then
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DPython3_EXECUTABLE=/usr/bin/python3 >"$scratch/cmake.log" 2>&1 || { cat "$scratch/cmake.log" >&2; exit 1; }
 fi
-cmake --build "$build" --parallel "$(nproc)" --target rio_t_point_cloud_fuzzer rio_t_parameters_fuzzer >"$scratch/make.log" 2>&1 ||
+cmake --build "$build" --parallel "$(nproc)" --target rio_t_point_cloud_fuzzer rio_t_parameters_fuzzer \
+  rio_t_odometry_fuzzer >"$scratch/make.log" 2>&1 ||
   { tail -n 40 "$scratch/make.log" >&2; exit 1; }
 programs=$build/devel/lib/rio_t
 findings=$build/findings
@@ -45,8 +46,9 @@ fuzz() {
 export UBSAN_OPTIONS=print_stacktrace=1
 fuzz point_cloud -max_len=2048 & first=$!
 fuzz parameters config -max_len=2048 -dict="$scratch/words" & second=$!
+fuzz odometry -max_len=16384 & third=$!
 clean=true
-for run in "point_cloud $first" "parameters $second"; do
+for run in "point_cloud $first" "parameters $second" "odometry $third"; do
   read -r name id <<<"$run"
   if ! wait "$id"; then
     clean=false
