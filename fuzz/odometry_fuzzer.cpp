@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 using rio_t::Time;
 
 constexpr double kGravity = 9.81;
-constexpr double kImuPeriod = 0.01;  // [s]
-constexpr double kLongest = 20.0;    // [s] of IMU; more takes too long
+constexpr double kImuPeriod = 0.01;     // [s]
+constexpr double kLongest = 20.0;       // [s] of IMU; more takes too long
 constexpr double kLongestTime = 4.0e9;  // [s] stamps of ROS span 2^32 seconds
 
 void require(bool holds, const char* what) {
@@ -29,18 +29,17 @@ rio_t::OdometryOptions anyOptions(FuzzedDataProvider& input) {
   rio_t::OdometryOptions options;
   options.initialization.duration = 0.5;
   options.init_motion_after = 1.0;
-  options.init_mode = input.PickValueInArray(
-      {rio_t::InitMode::kAuto, rio_t::InitMode::kStatic, rio_t::InitMode::kMotion});
+  options.init_mode =
+      input.PickValueInArray({rio_t::InitMode::kAuto, rio_t::InitMode::kStatic, rio_t::InitMode::kMotion});
   rio_t::SmootherOptions& smoother = options.smoother;
-  smoother.radar_factor =
-      input.ConsumeBool() ? rio_t::RadarFactor::kDoppler : rio_t::RadarFactor::kVelocity;
+  smoother.radar_factor = input.ConsumeBool() ? rio_t::RadarFactor::kDoppler : rio_t::RadarFactor::kVelocity;
   smoother.estimate_extrinsics =
       input.PickValueInArray({rio_t::EstimateExtrinsics::kNone, rio_t::EstimateExtrinsics::kRotation,
                               rio_t::EstimateExtrinsics::kPose});
   smoother.estimate_time_offset = input.ConsumeBool();
   smoother.time_offset_shared = input.ConsumeBool();
-  smoother.time_offset_model = input.ConsumeBool() ? rio_t::TimeOffsetModel::kImu
-                                                   : rio_t::TimeOffsetModel::kConstantAcceleration;
+  smoother.time_offset_model =
+      input.ConsumeBool() ? rio_t::TimeOffsetModel::kImu : rio_t::TimeOffsetModel::kConstantAcceleration;
   smoother.solver = input.ConsumeBool() ? rio_t::WindowSolver::kChain : rio_t::WindowSolver::kCeres;
   if (smoother.time_offset_model == rio_t::TimeOffsetModel::kConstantAcceleration) {  // it takes no other
     smoother.radar_factor = rio_t::RadarFactor::kVelocity;

@@ -68,6 +68,10 @@ TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
   bad.acceleration.x() = -1e4;
   EXPECT_EQ(feed(bad), "imu_not_plausible");
   EXPECT_FALSE(is_taken);
+  bad = motion.imuSample(1.0);
+  bad.angular_velocity.z() = -400.0;
+  EXPECT_EQ(feed(bad), "imu_not_plausible");
+  EXPECT_FALSE(is_taken);
   EXPECT_EQ(feed(1.0), "");
   EXPECT_TRUE(is_taken);
 }
@@ -90,6 +94,8 @@ TEST_F(Gate, RangesThatAreToldBoundTheReadings) {
   EXPECT_EQ(fed(70.0, 2.9), "imu_saturated") << "the range may be rounded";
   EXPECT_TRUE(is_taken);
   EXPECT_EQ(fed(90.0, 2.9), "imu_not_plausible");
+  EXPECT_FALSE(is_taken);
+  EXPECT_EQ(fed(39.0, 6.1), "imu_not_plausible");
   EXPECT_FALSE(is_taken);
 }
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "low_passed_axis.h"
 
 namespace rio_t {
@@ -88,6 +90,29 @@ TEST(StuckAxisDetector, TheUsualJumpIsRememberedForSecondsAtAnyRate) {
     axis.vary(30.0);
     EXPECT_TRUE(axis.check(3.0)) << rate << " Hz";
   }
+}
+
+/// Readings that a bus spoils: each differs from the one before, and the true ones go on after them.
+TEST(StuckAxisDetector, CorruptReadingsInARowAreReplacedAndTheTrueOnesAreNot) {
+  const std::vector<std::vector<double>> bursts = {{17.0}, {17.0, -9.0}, {-500.0, 500.0}, {12.0, -16.0, 8.0}};
+  for (const double rate : kRates) {
+    for (const std::vector<double>& burst : bursts) {
+      FedAxis axis{{}, rate};
+      axis.vary(1.0);
+      for (const double reading : burst) {
+        EXPECT_TRUE(axis.check(reading)) << rate << " Hz, " << reading << " of " << burst.size();
+      }
+      axis.vary(1.0);
+    }
+  }
+}
+
+/// Over a gap a platform may change its rate, and it goes on to change it.
+TEST(StuckAxisDetector, ATurnThatGrowsAfterAGapIsBelieved) {
+  FedAxis axis;
+  axis.vary(1.0);
+  axis.count += 5;
+  for (const double reading : {3.0, 4.0, 5.0, 5.5, 5.6, 5.5}) EXPECT_FALSE(axis.check(reading)) << reading;
 }
 
 }  // namespace

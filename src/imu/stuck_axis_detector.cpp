@@ -58,7 +58,7 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
   const double from_stuck = stuck_at_ ? std::abs(reading - *stuck_at_) : 0.0;
   // After a jump that no mass makes, the noise of a stuck axis is no motion either.
   const bool stays = stuck_at_ && from_stuck <= (is_impossible_ ? unusual : 0.0);
-  // A reading that is as far from the last wrong one is wrong, too.
+  // A reading that is far from the last wrong one is wrong, too.
   const bool jumps_away = jump > limit && (!stuck_at_ || from_stuck > limit);
   const bool freezes = !stuck_at_ && is_frozen && !is_saturated;
   if (jumps_away || freezes) {

@@ -3,6 +3,7 @@
 `Site` says where: `begin` and `end` of the fault in seconds after the first message, as recorded. Faults that are drawn
 take `site.random`, which starts anew for each case, so that a case is the same in every run.
 """
+import collections
 import dataclasses
 import itertools
 
@@ -253,6 +254,21 @@ def axis_freezes(sensor):
             of[0] = frozen[0]
             return of
         return edit_imu(messages, site, **{sensor: freeze})
+    return inject
+
+
+def gyro_corrupt():
+    """The first three samples of each second have any rates of up to 17 rad/s, a thousand degrees per second."""
+    def inject(messages, site):
+        samples = collections.Counter()
+        def comes_first(message):
+            second = int(site.seconds(message))
+            samples[second] += 1
+            return site.covers(message) and samples[second] <= 3
+        def spoil(message):
+            of = message.content.angular_velocity
+            of.x, of.y, of.z = map(float, site.random.uniform(-17.0, 17.0, 3))
+        return edit(messages, "imu", comes_first, spoil)
     return inject
 
 

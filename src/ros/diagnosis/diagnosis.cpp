@@ -421,7 +421,7 @@ std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Conf
 std::string describeDropped(const Counts& dropped) {
   static const std::map<std::string, std::string> kTexts = {
       {"imu_not_finite", "were not finite"},
-      {"imu_not_plausible", "had an acceleration that no IMU measures"},
+      {"imu_not_plausible", "had a reading that no IMU measures"},
       {"imu_out_of_order", "were out of order"},
       {"imu_stamp_jump", "were good ones after the gap, dropped for imu_jump_patience"}};
   std::string text;

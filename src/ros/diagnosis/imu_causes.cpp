@@ -23,14 +23,14 @@ constexpr ImuFault kImuFaults[] = {
      "Look for a second publisher on imu_topic."},
     {"imu_not_finite", 1, "IMU samples are not finite.",
      "Correct the driver of the IMU: it writes NaN or infinity."},
-    {"imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
-     "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU."},
+    {"imu_not_plausible", 1, "IMU samples have a reading that no IMU measures.",
+     "Check imu_acceleration_unit, imu_accel_range and imu_gyro_range, the cable and the driver of the IMU."},
     {"imu_repeated", 1, "IMU samples have the values of the sample before, although the IMU turns.",
      "Let the driver of the IMU publish a sample only if it has read a new one."},
     {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
      "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience and "
      "max_bridged_imu_gap above them."},
-    {"imu_stuck", 1, "IMU samples have an axis that stays at one reading.",
+    {"imu_stuck", 1, "IMU samples have an axis that stays at one reading, or jumps to and fro.",
      "Look at the cable and the driver of the IMU: one of its axes fails."}};
 
 /// Share of the IMU samples that a fault affects.
