@@ -107,6 +107,22 @@ TEST(StuckAxisDetector, CorruptReadingsInARowAreReplacedAndTheTrueOnesAreNot) {
   }
 }
 
+/// A wrong reading that is near the true one passes. Then the true ones do not stick, nor does a far one
+/// pass.
+TEST(StuckAxisDetector, AWrongReadingThatPassesTellsNothingOfTheNext) {
+  for (const double rate : kRates) {
+    FedAxis axis{{}, rate};
+    axis.vary(1.0);
+    EXPECT_FALSE(axis.check(1.9)) << rate << " Hz";
+    EXPECT_TRUE(axis.check(-3.0)) << rate << " Hz";
+    axis.vary(1.0);
+    EXPECT_TRUE(axis.check(6.0)) << rate << " Hz";
+    EXPECT_FALSE(axis.check(-1.9)) << rate << " Hz";
+    EXPECT_FALSE(axis.check(0.2)) << rate << " Hz";
+    axis.vary(1.0);
+  }
+}
+
 /// Over a gap a platform may change its rate, and it goes on to change it.
 TEST(StuckAxisDetector, ATurnThatGrowsAfterAGapIsBelieved) {
   FedAxis axis;

@@ -48,11 +48,12 @@ bool FrozenAxisDetector::isFrozen(Time time, double reading, bool turns) {
 std::optional<double> StuckAxisDetector::check(Time time, double reading, bool turns, bool is_saturated) {
   const bool is_frozen = frozen_.isFrozen(time, reading, turns);
   if (!good_) {
-    good_ = reading;
+    good_ = good_before_ = reading;
     good_at_ = time;
   }
   const double since = std::max(0.0, time - good_at_);
-  const double jump = std::abs(reading - *good_);
+  // The last one may be wrong, although it is no jump. The one before it then shows that this one is right.
+  const double jump = std::min(std::abs(reading - *good_), std::abs(reading - good_before_));
   const double unusual = kUnusual * usual_jump_;
   const double limit = std::max(kSmallestJump, unusual);
   const double from_stuck = stuck_at_ ? std::abs(reading - *stuck_at_) : 0.0;
@@ -63,6 +64,7 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
   const bool freezes = !stuck_at_ && is_frozen && !is_saturated;
   if (jumps_away || freezes) {
     stuck_at_ = reading;
+    last_jump_ = 0.0;
     is_impossible_ = jump > kHandShakes * since;
   }
   if (stays || freezes || (jumps_away && is_impossible_))
@@ -76,8 +78,10 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
     is_impossible_ = false;
     return std::nullopt;
   }
-  if (!stuck_at_) usual_jump_ = std::max(fade(since) * usual_jump_, jump);
+  usual_jump_ = std::max(fade(since) * usual_jump_, last_jump_);
+  last_jump_ = stuck_at_ ? 0.0 : jump;
   stuck_at_.reset();
+  good_before_ = *good_;
   good_ = reading;
   good_at_ = time;
   return std::nullopt;

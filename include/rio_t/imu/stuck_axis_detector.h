@@ -37,10 +37,12 @@ class StuckAxisDetector {
 
  private:
   std::optional<double> good_;  ///< the last reading that is no jump
+  double good_before_ = 0.0;    ///< the one before it
   Time good_at_;
   std::optional<double> stuck_at_;  ///< the last reading that jumped away or froze; none once it is back
   bool is_impossible_ = false;      ///< whether no mass can make that jump
   double usual_jump_ = 0.0;         ///< largest recent one between neighbours [rad/s]
+  double last_jump_ = 0.0;          ///< that of good_, which is usual if the next reading is good, too
   FrozenAxisDetector frozen_;
 };
 
