@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
 #include <vector>
 
 #include "low_passed_axis.h"
@@ -120,6 +121,23 @@ TEST(StuckAxisDetector, AWrongReadingThatPassesTellsNothingOfTheNext) {
     EXPECT_FALSE(axis.check(-1.9)) << rate << " Hz";
     EXPECT_FALSE(axis.check(0.2)) << rate << " Hz";
     axis.vary(1.0);
+  }
+}
+
+/// In 50 ms a platform comes to some of the corrupt readings. They do not agree with each other, as motion
+/// does.
+TEST(StuckAxisDetector, TheTrueReadingsAfterManyCorruptOnesAreNotReplaced) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> corrupt(-17.0, 17.0);
+  for (const double rate : kRates) {
+    for (int burst = 0; burst < 20; ++burst) {
+      FedAxis axis{{}, rate};
+      axis.vary(1.0);
+      for (int i = 0; i < 0.05 * rate; ++i) axis.check(corrupt(random));
+      int replaced = 0;
+      for (int i = 0; i < rate; ++i) replaced += axis.check(0.001 * (i % 2)) ? 1 : 0;
+      EXPECT_EQ(replaced, 0) << rate << " Hz, burst " << burst;
+    }
   }
 }
 
