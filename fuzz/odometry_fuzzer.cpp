@@ -1,5 +1,5 @@
-// What sensors may give the estimator: any options of structure, then any order of IMU samples, scans and
-// pressures with any finite values and stamps. See scripts/fuzz.sh.
+// The fuzzer chooses the options of the odometry. Then it feeds IMU samples, scans and pressures in any
+// order, with any finite values and stamps. See scripts/fuzz.sh.
 #include <fuzzer/FuzzedDataProvider.h>
 
 #include <algorithm>

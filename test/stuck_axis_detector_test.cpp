@@ -108,8 +108,7 @@ TEST(StuckAxisDetector, CorruptReadingsInARowAreReplacedAndTheTrueOnesAreNot) {
   }
 }
 
-/// A wrong reading that is near the true one passes. Then the true ones do not stick, nor does a far one
-/// pass.
+/// A wrong reading that is near the true one passes. A far one after it does not.
 TEST(StuckAxisDetector, AWrongReadingThatPassesTellsNothingOfTheNext) {
   for (const double rate : kRates) {
     FedAxis axis{{}, rate};
@@ -121,6 +120,16 @@ TEST(StuckAxisDetector, AWrongReadingThatPassesTellsNothingOfTheNext) {
     EXPECT_FALSE(axis.check(-1.9)) << rate << " Hz";
     EXPECT_FALSE(axis.check(0.2)) << rate << " Hz";
     axis.vary(1.0);
+  }
+}
+
+TEST(StuckAxisDetector, TheTrueReadingsAfterAWrongOneThatPassesDoNotStick) {
+  for (const double rate : kRates) {
+    FedAxis axis{{}, rate};
+    axis.vary(1.0);
+    EXPECT_FALSE(axis.check(1.9)) << rate << " Hz";
+    EXPECT_FALSE(axis.check(-0.2)) << rate << " Hz, 2.1 rad/s from the wrong reading";
+    EXPECT_FALSE(axis.check(-0.201)) << rate << " Hz";
   }
 }
 

@@ -16,7 +16,7 @@ constexpr double kHandShakes = 60.0;  // [rad/s^2] of that hand
 constexpr double kUnusual = 5.0;      // [usual jumps] above this a reading jumps away, below it is noise
 /// Corrupt readings of up to 17 rad/s are within 2 rad/s of each other 12 times in 100, and four times in a
 /// row once in 5000.
-constexpr double kAgreeing = 4.0;
+constexpr int kAgreeing = 4;
 constexpr double kMemory = 10.0;  // [s] of the usual jump and the longest run
 /// Fewer repeats show nothing: if the noise of a gyro is one step, five in a row come once in 600 samples.
 constexpr double kFewRepeats = 10.0;
@@ -56,7 +56,7 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
     good_at_ = time;
   }
   const double since = std::max(0.0, time - good_at_);
-  // The last one may be wrong, although it is no jump. The one before it then shows that this one is right.
+  // The last good one may be wrong: a wrong reading near the truth passes. So the one before it counts, too.
   const double jump = std::min(std::abs(reading - *good_), std::abs(reading - good_before_));
   const double unusual = kUnusual * usual_jump_;
   const double limit = std::max(kSmallestJump, unusual);
@@ -64,13 +64,14 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
   const double from_stuck = stuck_at_ ? std::abs(reading - *stuck_at_) : 0.0;
   // After a jump that no mass makes, the noise of a stuck axis is no motion either.
   const bool stays =
-      stuck_at_ && (is_impossible_ ? from_stuck <= unusual : from_stuck == 0.0 && agreeing_ == 0.0);
+      stuck_at_ && (is_impossible_ ? from_stuck <= unusual : from_stuck == 0.0 && agreeing_ == 0);
   // A reading that is far from the last wrong one is wrong, too.
   const bool jumps_away = jump > limit && (!stuck_at_ || from_stuck > limit);
   const bool freezes = !stuck_at_ && is_frozen && !is_saturated;
   if (jumps_away || freezes) {
     stuck_at_ = reading;
-    last_jump_ = agreeing_ = 0.0;
+    last_jump_ = 0.0;
+    agreeing_ = 0;
     is_impossible_ = jump > kHandShakes * since;
   }
   if (stays || freezes || (jumps_away && is_impossible_))
@@ -82,10 +83,10 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
     // platform can have come so far.
     stuck_at_ = reading;
     is_impossible_ = false;
-    agreeing_ = 0.0;
+    agreeing_ = 0;
     return std::nullopt;
   }
-  agreeing_ = from_last <= limit ? agreeing_ + 1.0 : 0.0;
+  agreeing_ = from_last <= limit ? std::min(agreeing_ + 1, kAgreeing) : 0;
   if (stuck_at_ && agreeing_ < kAgreeing) return std::nullopt;
   usual_jump_ = std::max(fade(since) * usual_jump_, last_jump_);
   last_jump_ = stuck_at_ ? 0.0 : jump;

@@ -41,10 +41,10 @@ class StuckAxisDetector {
   Time good_at_;
   std::optional<double> stuck_at_;  ///< the last reading that jumped away or froze; none once others agree
   bool is_impossible_ = false;      ///< whether no mass can make that jump
-  double agreeing_ = 0.0;           ///< readings since then, each near the one before it and near good_
-  double last_ = 0.0;               ///< [rad/s] the last reading of all
-  double usual_jump_ = 0.0;         ///< largest recent one between neighbours [rad/s]
-  double last_jump_ = 0.0;          ///< that of good_, which is usual if the next reading is good, too
+  int agreeing_ = 0;   ///< readings since then that are near good_ and the one before; at most kAgreeing
+  double last_ = 0.0;  ///< [rad/s] the last reading of all
+  double usual_jump_ = 0.0;  ///< largest recent one between neighbours [rad/s]
+  double last_jump_ = 0.0;   ///< that of good_, which is usual if the next reading is good, too
   FrozenAxisDetector frozen_;
 };
 

@@ -24,9 +24,8 @@ constexpr ImuFault kImuFaults[] = {
     {"imu_not_finite", 1, "IMU samples are not finite.",
      "Correct the driver of the IMU: it writes NaN or infinity."},
     {"imu_not_plausible", 1, "IMU samples have a reading that no IMU measures.",
-     "Check imu_acceleration_unit, imu_rate_unit, imu_accel_range and imu_gyro_range, the cable and the "
-     "driver of "
-     "the IMU."},
+     "Check imu_acceleration_unit, imu_rate_unit, imu_accel_range and imu_gyro_range, then the cable and the "
+     "driver of the IMU."},
     {"imu_repeated", 1, "IMU samples have the values of the sample before, although the IMU turns.",
      "Let the driver of the IMU publish a sample only if it has read a new one."},
     {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
